@@ -1,0 +1,30 @@
+"""The STL format: a soup of triangles that share no vertices."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+from trimesh.exchange.stl import load_stl
+
+from csm.errors import MeshError
+from csm.mesh.io.raw import RawMesh
+
+
+def parse_stl(data: bytes) -> RawMesh:
+    """Read an STL file, ASCII or binary, as it is: three vertices of its own for each of the M triangles, N = 3 M.
+
+    Nothing is merged, so the surface is not connected and `csm check` reports duplicate vertices and M components.
+
+    Raises
+    ------
+    MeshError
+        If there is no triangle or the file is damaged.
+    """
+    loaded = load_stl(io.BytesIO(data))
+    if "geometry" in loaded:
+        raise MeshError(f"the file holds {len(loaded['geometry'])} solids, wanted one; save them as one")
+    vertices, faces = np.asarray(loaded["vertices"]), np.asarray(loaded["faces"])
+    if len(faces) == 0 or len(vertices) != 3 * len(faces):
+        raise MeshError(f"found {len(vertices)} corners of {len(faces)} triangles: an empty or damaged STL file")
+    return RawMesh(vertices, faces)
