@@ -1,1 +1,1 @@
-"""csm.mesh."""
+"""Triangle meshes: the type, files, correspondences and findings."""
