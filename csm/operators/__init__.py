@@ -1,1 +1,6 @@
-"""csm.operators."""
+"""Laplacians of a mesh and what they are made of: frames, stiffness, spectra, geodesic distances."""
+
+from csm.operators.bundle import Memo, Operators
+from csm.operators.spectrum import Spectrum
+
+__all__ = ["Memo", "Operators", "Spectrum"]

@@ -1,0 +1,135 @@
+"""The operators of one mesh, computed when first asked for and kept."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from csm._types import Arrays, FloatArray
+from csm.mesh.shape import Mesh
+from csm.operators.frames import FrameKind, face_frames
+from csm.operators.laplacian import (
+    AnisotropicStiffness,
+    anisotropic_stiffness,
+    degenerate_faces,
+    stiffness,
+    vertex_areas,
+)
+from csm.operators.spectrum import Spectrum, eigenpairs
+
+_log = logging.getLogger(__name__)
+
+
+class Memo(Protocol):
+    """Somewhere to look results up and keep them, such as `csm.data.store.Store`."""
+
+    def fetch(self, kind: str, mesh: Mesh, params: Mapping[str, Any], make: Callable[[], Arrays]) -> Arrays:
+        """Return what is kept for `kind`, the geometry of `mesh` and the plain-data `params`, or make and keep it."""
+        ...
+
+
+class Operators:
+    """Laplacians and spectra of one mesh, lazy and memoised.
+
+    Parameters
+    ----------
+    mesh
+        The shape.
+    unit_area
+        Scale it to a surface area of 1 first, as every default in csm assumes; `self.mesh.scale` keeps the way back.
+    memo
+        Where spectra are looked up and kept beyond this object; without one they live as long as it does.
+
+    Raises
+    ------
+    MeshError
+        If the mesh cannot carry a Laplacian.
+
+    Attributes
+    ----------
+    mesh
+        The (rescaled) mesh that every result refers to.
+    """
+
+    def __init__(self, mesh: Mesh, *, unit_area: bool = True, memo: Memo | None = None) -> None:
+        self.mesh = mesh.unit_area() if unit_area else mesh
+        self._memo = memo
+        self._areas: FloatArray | None = None
+        self._anisotropic: dict[tuple[FrameKind, int], AnisotropicStiffness] = {}
+        self._spectra: dict[tuple[str, tuple[tuple[str, Any], ...]], Spectrum] = {}
+
+    @property
+    def mass(self) -> FloatArray:
+        """Vertex areas, shape (N,)."""
+        if self._areas is None:
+            self._areas = vertex_areas(self.mesh)
+        return self._areas
+
+    def anisotropic(self, *, frame: FrameKind = "line_field", sweeps: int = 3) -> AnisotropicStiffness:
+        """Return the stiffness of every strength and angle for one choice of frames."""
+        key = (frame, sweeps)
+        if key not in self._anisotropic:
+            self._anisotropic[key] = anisotropic_stiffness(
+                self.mesh, face_frames(self.mesh, frame=frame, sweeps=sweeps)
+            )
+        return self._anisotropic[key]
+
+    def lbo(self, k: int) -> Spectrum:
+        """Return the `k` smallest eigenpairs of the isotropic Laplacian."""
+        return self._spectrum("lbo", {"k": int(k)}, lambda: self._solve(stiffness(self.mesh), k))
+
+    def albo(self, alpha: float, theta: float, k: int, *, frame: FrameKind = "line_field", sweeps: int = 3) -> Spectrum:
+        """Return the `k` smallest eigenpairs of the anisotropic Laplacian of strength `alpha` and angle `theta`.
+
+        `frame` and `sweeps` are those of `csm.operators.frames.face_frames`; `theta` is in radians, of period pi.
+        """
+        params = {"alpha": float(alpha), "theta": float(theta), "k": int(k), "frame": str(frame), "sweeps": int(sweeps)}
+
+        def solve() -> Spectrum:
+            return self._solve(self.anisotropic(frame=frame, sweeps=sweeps).at(alpha, theta), k)
+
+        return self._spectrum("albo", params, solve)
+
+    def _solve(self, matrix: Any, k: int) -> Spectrum:
+        spectrum = eigenpairs(matrix, self.mass, k, name=self.mesh.name)
+        flat = degenerate_faces(self.mesh)
+        if flat.size == 0:
+            return spectrum
+        note = f"{flat.size} faces have (almost) no area, the first is face {flat[0]}; the Laplacian floors their area"
+        _log.warning("%s: %s", self.mesh.name, note)
+        return replace(spectrum, notes=(*spectrum.notes, note))
+
+    def _spectrum(self, kind: str, params: dict[str, Any], solve: Callable[[], Spectrum]) -> Spectrum:
+        key = (kind, tuple(params.items()))
+        if key not in self._spectra:
+            if self._memo is None:
+                self._spectra[key] = solve()
+            else:
+                self._spectra[key] = _from_arrays(
+                    self._memo.fetch(kind, self.mesh, params, lambda: _to_arrays(solve()))
+                )
+        return self._spectra[key]
+
+
+def _to_arrays(spectrum: Spectrum) -> Arrays:
+    return {
+        "evals": spectrum.evals,
+        "evecs": spectrum.evecs,
+        "mass": spectrum.mass,
+        "residual": np.array(spectrum.residual),
+        "notes": np.array(spectrum.notes, dtype=np.str_),
+    }
+
+
+def _from_arrays(arrays: Arrays) -> Spectrum:
+    return Spectrum(
+        evals=arrays["evals"],
+        evecs=arrays["evecs"],
+        mass=arrays["mass"],
+        residual=float(arrays["residual"]),
+        notes=tuple(str(note) for note in arrays["notes"]),
+    )

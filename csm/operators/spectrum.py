@@ -1,0 +1,207 @@
+"""The generalised eigenproblem  S phi = lambda diag(mass) phi  of a mesh Laplacian, solved and checked."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import ArpackError, LinearOperator, SuperLU, eigsh, splu
+from threadpoolctl import ThreadpoolController
+
+from csm._types import FloatArray
+from csm.errors import ConfigError, MeshError, NumericalError
+
+_log = logging.getLogger(__name__)
+
+_DENSE_BELOW = 400  # vertices; smaller problems are solved densely
+_RESIDUAL = 1e-8
+_ORTHONORMAL = 1e-8
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """The K smallest eigenpairs of a Laplacian, checked.
+
+    Attributes
+    ----------
+    evals
+        Shape (K,), ascending, at least 0; in units of 1/area (the inverse square of the mesh's unit of length).
+    evecs
+        Shape (N, K), orthonormal with respect to `mass`; of each, the first entry of greatest magnitude is positive.
+    mass
+        Shape (N,), the vertex areas.
+    residual
+        Greatest of |S phi - lambda M phi| over the K pairs, in the norm of the inverse mass, divided by the greatest
+        eigenvalue.
+    notes
+        What happened that a careful reader would want to know, such as a second attempt.
+    """
+
+    evals: FloatArray
+    evecs: FloatArray
+    mass: FloatArray
+    residual: float
+    notes: tuple[str, ...] = ()
+
+    def first(self, k: int) -> Spectrum:
+        """Return the `k` smallest pairs of these; ConfigError if there are fewer."""
+        if not 1 <= k <= len(self.evals):
+            raise ConfigError(f"asked for the first {k} of {len(self.evals)} eigenpairs; compute more of them")
+        return replace(self, evals=self.evals[:k], evecs=self.evecs[:, :k])
+
+
+def eigenpairs(stiffness: sparse.csr_array, mass: FloatArray, k: int, *, name: str = "mesh") -> Spectrum:
+    """Return the `k` smallest eigenpairs of  S phi = lambda diag(mass) phi.
+
+    Shift-invert Lanczos with a fixed start vector on one BLAS thread, or a dense solver for small meshes.  The answer
+    is accepted only if residuals and orthonormality hold and no eigenvalue was passed over (Sylvester's law of
+    inertia: the signs of a factorisation count the eigenvalues below a bound).  Otherwise it is tried again, at most
+    twice, which `Spectrum.notes` records.
+
+    Parameters
+    ----------
+    stiffness
+        Symmetric positive semidefinite, (N, N); several components and boundaries are fine.
+    mass
+        Positive vertex areas, shape (N,).
+    k
+        Number of pairs, from 1 to N.
+    name
+        The mesh's name in messages.
+
+    Raises
+    ------
+    ConfigError
+        If `k` is not between 1 and N.
+    MeshError
+        If a vertex has no area or the matrix is not finite.
+    NumericalError
+        If no attempt passed the checks.
+    """
+    _require_solvable(stiffness, mass, k, name)
+    scale = 1.0 / np.sqrt(mass)
+    symmetric = _symmetrised(stiffness, scale)
+    unit = 1.0 / mass.sum()
+    if len(mass) < _DENSE_BELOW or k > len(mass) // 3:
+        attempts = [_Attempt("dense", 0.0, 0)]
+    else:
+        ncv = 2 * k + 1
+        attempts = [
+            _Attempt("shift-invert", -1e-2 * unit, max(ncv, 20)),
+            _Attempt("shift-invert, larger subspace", -1e-2 * unit, min(2 * ncv + 20, len(mass) - 1)),
+            _Attempt("shift-invert, larger shift and subspace", -unit, min(3 * ncv + 20, len(mass) - 1)),
+        ]
+    notes: list[str] = []
+    with _blas().limit(limits=1):
+        for attempt in attempts:
+            try:
+                found = _solve(symmetric, k, attempt)
+            except (ArpackError, RuntimeError, np.linalg.LinAlgError) as error:
+                fault = str(error)
+            else:
+                fault = _fault(symmetric, found)
+            if not fault:
+                evecs = _with_fixed_signs(scale[:, None] * found.evecs)
+                return Spectrum(np.maximum(found.evals, 0.0), evecs, mass, _residual(symmetric, found), tuple(notes))
+            notes.append(f"eigenproblem with k={k} by {attempt.method}: {fault}; tried again")
+            _log.warning("%s: %s", name, notes[-1])
+    raise NumericalError(
+        f"{name}: the eigenproblem with k={k} failed in {len(attempts)} attempts, at last because {fault}; "
+        "run `csm check` on the mesh"
+    )
+
+
+class _Attempt(NamedTuple):
+    method: str
+    shift: float
+    ncv: int
+
+
+class _Pairs(NamedTuple):
+    evals: FloatArray
+    evecs: FloatArray  # of the symmetric problem, orthonormal
+
+
+@cache
+def _blas() -> ThreadpoolController:
+    return ThreadpoolController()  # listing the loaded libraries takes milliseconds, so once
+
+
+def _require_solvable(stiffness: sparse.csr_array, mass: FloatArray, k: int, name: str) -> None:
+    n = len(mass)
+    if stiffness.shape != (n, n):
+        raise ConfigError(f"{name}: the stiffness has shape {stiffness.shape}, but there are {n} masses")
+    if not 1 <= k <= n:
+        raise ConfigError(f"{name}: asked for {k} eigenpairs, but {n} vertices have {n}; ask for 1 to {n}")
+    if not (np.isfinite(stiffness.data).all() and np.isfinite(mass).all()):
+        raise MeshError(f"{name}: the Laplacian has entries that are not finite; run `csm check` on the mesh")
+    without = np.flatnonzero(mass <= 0)
+    if without.size:
+        raise MeshError(
+            f"{name}: {without.size} vertices have no area around them (the first is vertex {without[0]}), so the "
+            "eigenproblem has no answer; remove vertices that belong to no face with area"
+        )
+
+
+def _symmetrised(stiffness: sparse.csr_array, scale: FloatArray) -> sparse.csc_array:
+    """Return M^-1/2 S M^-1/2, whose eigenvalues are those of the generalised problem."""
+    coo = stiffness.tocoo()
+    data = coo.data * scale[coo.row] * scale[coo.col]
+    return sparse.csc_array((data, (coo.row, coo.col)), shape=stiffness.shape)
+
+
+def _factor(symmetric: sparse.csc_array, shift: float) -> SuperLU:
+    """Factor  symmetric - shift I  with diagonal pivots, so that the signs on U's diagonal are its inertia."""
+    shifted = sparse.csc_array(symmetric - shift * sparse.eye_array(symmetric.shape[0]))
+    return splu(shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+
+
+def _solve(symmetric: sparse.csc_array, k: int, attempt: _Attempt) -> _Pairs:
+    if attempt.method == "dense":
+        evals, evecs = np.linalg.eigh(symmetric.toarray())
+        return _Pairs(evals[:k], evecs[:, :k])
+    n = symmetric.shape[0]
+    inverse = LinearOperator((n, n), matvec=_factor(symmetric, attempt.shift).solve, dtype=np.float64)
+    start = np.random.default_rng(0).standard_normal(n)
+    evals, evecs = eigsh(symmetric, k, sigma=attempt.shift, OPinv=inverse, v0=start, ncv=attempt.ncv)
+    order = np.argsort(evals)
+    return _Pairs(evals[order], evecs[:, order])
+
+
+def _fault(symmetric: sparse.csc_array, found: _Pairs) -> str:
+    """Return what is wrong with the pairs, or an empty string."""
+    residual = _residual(symmetric, found)
+    if not residual <= _RESIDUAL:
+        return f"the relative residual is {residual:.1e}, wanted at most {_RESIDUAL:.0e}"
+    error = np.abs(found.evecs.T @ found.evecs - np.eye(len(found.evals))).max()
+    if not error <= _ORTHONORMAL:
+        return f"the eigenvectors are orthonormal only to {error:.1e}"
+    missing = _missing(symmetric, found.evals)
+    return f"{missing} eigenvalues were passed over" if missing else ""
+
+
+def _residual(symmetric: sparse.csc_array, found: _Pairs) -> float:
+    defect = np.linalg.norm(symmetric @ found.evecs - found.evecs * found.evals, axis=0).max()
+    return float(defect / max(abs(found.evals[-1]), np.finfo(float).tiny))
+
+
+def _missing(symmetric: sparse.csc_array, evals: FloatArray) -> int:
+    """Count the eigenvalues that `evals` should contain and does not, up to its last clear gap."""
+    gaps = np.flatnonzero(np.diff(evals) > 1e-5 * evals[-1])
+    if gaps.size == 0:
+        return 0
+    last = gaps[-1]
+    bound = 0.5 * (evals[last] + evals[last + 1])
+    below = int((_factor(symmetric, bound).U.diagonal() < 0).sum())
+    return below - int(last + 1)
+
+
+def _with_fixed_signs(evecs: FloatArray) -> FloatArray:
+    magnitude = np.abs(evecs)
+    first_greatest = np.argmax(magnitude >= magnitude.max(axis=0) * (1 - 1e-6), axis=0)
+    signs: FloatArray = np.sign(evecs[first_greatest, np.arange(evecs.shape[1])])
+    return evecs * signs
