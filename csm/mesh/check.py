@@ -110,14 +110,15 @@ class _Topology:
     @cached_property
     def referenced(self) -> BoolArray:
         """Which vertices a face uses, shape (N,)."""
-        used: BoolArray = np.zeros(self.mesh.n_vertices, dtype=bool)
+        used = np.zeros(self.mesh.n_vertices, dtype=bool)
         used[self.mesh.faces] = True
         return used
 
     @cached_property
     def proper(self) -> BoolArray:
         """Which half-edges join two different vertices, shape (3 M,)."""
-        return self.tails != self.heads
+        proper: BoolArray = self.tails != self.heads
+        return proper
 
     @cached_property
     def edge_uses(self) -> IntArray:

@@ -7,6 +7,7 @@ import re
 import secrets
 import shutil
 import tarfile
+import tempfile
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -31,6 +32,14 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
         raise DataError(f"{path}: this is a folder, wanted a file") from None
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror})") from error
+
+
+def read_bytes_of_head(path: Path, size: int = 4096) -> bytes:
+    """Return the first bytes of a file, with the same errors as `read_bytes`."""
+    if not path.is_file():
+        return read_bytes(path)
+    with path.open("rb") as file:
+        return file.read(size)
 
 
 @contextmanager
@@ -117,9 +126,18 @@ def unpack(archive: Path, folder: Path) -> None:
         raise DataError(f"{archive}: cannot be unpacked ({error}); wanted a whole .zip or .tar archive") from error
 
 
-def read_bytes_of_head(path: Path, size: int = 4096) -> bytes:
-    """Return the first bytes of a file, with the same errors as `read_bytes`."""
-    if not path.is_file():
-        return read_bytes(path)
-    with path.open("rb") as file:
-        return file.read(size)
+@contextmanager
+def unpacked(source: Path) -> Iterator[Path]:
+    """Give a folder with the content of `source`: itself if it is a folder, else a temporary one, removed at the end.
+
+    Raises
+    ------
+    DataError
+        If `source` does not exist or is an archive that cannot be unpacked.
+    """
+    if source.is_dir():
+        yield source
+        return
+    with tempfile.TemporaryDirectory(prefix="csm-") as folder:
+        unpack(source, Path(folder))
+        yield Path(folder)
