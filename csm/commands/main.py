@@ -1,0 +1,45 @@
+"""The `csm` program: one word chooses the command, the rest is Hydra's."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+from csm import __version__
+
+COMMANDS = {
+    "train": "train a network on one set and test it on others",
+    "evaluate": "test a checkpoint on other sets or resolutions",
+    "matrix": "train once per training set, evaluate on every test set, resumable cell by cell",
+    "match": "match two meshes of your own",
+    "describe": "compute a descriptor of one mesh",
+    "prepare": "fill, check or prune the store of bases and descriptors",
+    "check": "list what is wrong with the meshes of a folder",
+}
+
+
+def usage() -> str:
+    """Return the text of ``csm --help``."""
+    rows = "\n".join(f"  {name:<10}{text}" for name, text in COMMANDS.items())
+    return (
+        f"csm {__version__}: dense correspondence between deformable meshes with spectral descriptors\n\n"
+        f"usage: csm COMMAND [key=value ...]\n\n{rows}\n\n"
+        "csm COMMAND --help lists the options, --cfg job shows the resolved configuration,\n"
+        "-m key=a,b,c runs every combination. An example that needs no data: csm train experiment=demo"
+    )
+
+
+def main() -> None:
+    """Run ``csm``; exit status 2 after an error that the user can mend."""
+    arguments = sys.argv[1:]
+    if not arguments or arguments[0] in ("-h", "--help", "help"):
+        print(usage())
+        return
+    if arguments[0] in ("-V", "--version"):
+        print(__version__)
+        return
+    if arguments[0] not in COMMANDS:
+        print(f"csm: there is no command {arguments[0]!r}; csm --help lists them", file=sys.stderr)
+        sys.exit(2)
+    sys.argv = [f"csm {arguments[0]}", *arguments[1:]]
+    importlib.import_module(f"csm.commands.{arguments[0]}").main()

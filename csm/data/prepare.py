@@ -1,0 +1,165 @@
+"""Fill the store: eigenbases and descriptors of many shapes, in parallel, resumable."""
+
+from __future__ import annotations
+
+import logging
+import multiprocessing
+import os
+import time
+from collections.abc import Iterable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from dataclasses import dataclass, field
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+from tqdm import tqdm
+
+from csm._types import Float32Array
+from csm.data.shapeset import Shape, ShapeSet
+from csm.data.store import Store
+from csm.descriptors.base import Descriptor
+from csm.errors import CsmError
+from csm.mesh.check import require_usable
+from csm.mesh.shape import Mesh
+from csm.operators.bundle import Operators
+from csm.operators.spectrum import Spectrum
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What a network wants to know of every shape.
+
+    Parameters
+    ----------
+    descriptor
+        Gives the input features.
+    basis_k
+        How many Laplace-Beltrami eigenpairs are kept.
+    """
+
+    descriptor: Descriptor
+    basis_k: int = 128
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A shape with its features, shape (N, Q), and the eigenbasis of its unit-area copy."""
+
+    shape: Shape
+    features: Float32Array
+    basis: Spectrum
+
+
+@dataclass(frozen=True)
+class Job:
+    """One shape of one set, to be prepared."""
+
+    shapes: ShapeSet
+    name: str
+
+    @property
+    def label(self) -> str:
+        """Set and shape, for messages."""
+        return f"{self.shapes.name}/{self.name}"
+
+
+@dataclass
+class Summary:
+    """What a preparation did: how many shapes were already there, made, or failed, and why."""
+
+    present: int = 0
+    made: int = 0
+    failures: list[tuple[str, str]] = field(default_factory=list)
+    seconds: float = 0.0
+
+    def table(self) -> str:
+        """Return the failures as aligned text, one line each."""
+        width = max((len(label) for label, _ in self.failures), default=0)
+        return "\n".join(f"{label:<{width}}  {why}" for label, why in self.failures)
+
+
+def compute_features(mesh: Mesh, descriptor: Descriptor, store: Store) -> Float32Array:
+    """Return the descriptor of a mesh, shape (N, Q), from the store or computed and kept."""
+    params = {"name": descriptor.name, **descriptor.parameters()}
+
+    def make() -> dict[str, Float32Array]:
+        require_usable(mesh)
+        return {"values": descriptor(mesh).values.astype(np.float32)}
+
+    values: Float32Array = store.fetch("descriptor", mesh, params, make)["values"]
+    return values
+
+
+def prepare_shape(shape: Shape, recipe: Recipe, store: Store) -> Prepared:
+    """Return one shape with features and basis, from the store where they are there."""
+    features = compute_features(shape.mesh, recipe.descriptor, store)
+    return Prepared(shape, features, Operators(shape.mesh, memo=store).lbo(recipe.basis_k))
+
+
+def _prepare_one(job: Job, recipe: Recipe, root: str) -> tuple[str, str]:
+    """Prepare one shape in a worker; return what happened ("present", "made" or "failed") and why."""
+    store = Store(root)
+    try:
+        with threadpool_limits(1):
+            prepare_shape(job.shapes.load(job.name), recipe, store)
+    except CsmError as error:
+        return "failed", str(error)
+    except Exception as error:  # one bad shape must not end the run; the table at the end names it
+        _log.exception("%s", job.label)
+        return "failed", f"{type(error).__name__}: {error}"
+    return ("made" if store.computed else "present"), ""
+
+
+def prepare(
+    jobs: Sequence[Job], recipe: Recipe, store: Store, *, workers: int | None = None, progress: bool = True
+) -> Summary:
+    """Fill the store for many shapes; what is there already is skipped, so a killed run is simply started again.
+
+    Parameters
+    ----------
+    jobs
+        The shapes.
+    recipe
+        What to compute for each.
+    store
+        Where it goes.
+    workers
+        Processes, each with one BLAS thread; by default one per core, and none for fewer than three shapes.
+    progress
+        Show a progress bar with the shape's name and the estimated time left.
+
+    Returns
+    -------
+    Summary
+        Failures are listed there, not raised.
+    """
+    workers = workers if workers is not None else (os.cpu_count() or 1) if len(jobs) > 2 else 0
+    summary, begun = Summary(), time.perf_counter()
+    with tqdm(total=len(jobs), desc="prepare", unit="shape", disable=not progress) as bar:
+        for job, (state, why) in _run(jobs, recipe, store, workers):
+            if state == "failed":
+                summary.failures.append((job.label, why))
+            elif state == "made":
+                summary.made += 1
+            else:
+                summary.present += 1
+            bar.set_postfix_str(job.label, refresh=False)
+            bar.update()
+    summary.seconds = time.perf_counter() - begun
+    return summary
+
+
+def _run(jobs: Sequence[Job], recipe: Recipe, store: Store, workers: int) -> Iterable[tuple[Job, tuple[str, str]]]:
+    root = str(store.root)
+    if workers < 1:
+        yield from ((job, _prepare_one(job, recipe, root)) for job in jobs)
+        return
+    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+        running: dict[Future[tuple[str, str]], Job] = {
+            pool.submit(_prepare_one, job, recipe, root): job for job in jobs
+        }
+        while running:
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                yield running.pop(future), future.result()

@@ -1,0 +1,87 @@
+"""Named lists of training and test shapes, with a checksum that results quote."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from csm.errors import DataError
+
+
+@dataclass(frozen=True)
+class Split:
+    """Which shapes a network learns from and which it is tested on.
+
+    Parameters
+    ----------
+    name
+        What results call the split.
+    train, test
+        Names of the shapes, in order.
+    source
+        Where the split was published.
+    """
+
+    name: str
+    train: tuple[str, ...]
+    test: tuple[str, ...]
+    source: str = ""
+
+    @property
+    def checksum(self) -> str:
+        """First 12 hex digits of the SHA-256 of both lists, in order."""
+        return hashlib.sha256(json.dumps([self.train, self.test]).encode()).hexdigest()[:12]
+
+    @property
+    def label(self) -> str:
+        """One line for result files: name, sizes and checksum."""
+        return f"{self.name} ({len(self.train)} train, {len(self.test)} test, {self.checksum})"
+
+    def held_out(self, n: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Divide the training list into shapes to fit and the last `n`, which are kept out of the fit.
+
+        Raises
+        ------
+        DataError
+            If that leaves nothing to fit.
+        """
+        if not 0 <= n < len(self.train):
+            raise DataError(f"split {self.name}: cannot hold out {n} of {len(self.train)} training shapes")
+        keep = len(self.train) - n
+        return self.train[:keep], self.train[keep:]
+
+    def require(self, available: Sequence[str], where: str, part: str) -> None:
+        """Raise a DataError if shapes of `part` ("train" or "test") are not among `available`."""
+        wanted: tuple[str, ...] = getattr(self, part)
+        missing = [name for name in wanted if name not in set(available)]
+        if missing:
+            raise DataError(
+                f"{where}: {len(missing)} of the {len(wanted)} {part} shapes of split {self.name} are missing "
+                f"({', '.join(missing[:5])}{', ...' if len(missing) > 5 else ''}); `csm check` tells what is there"
+            )
+
+
+def read_split(path: str | Path) -> Split:
+    """Read a split from json: an object with name, train, test and, if it is to be verified, checksum.
+
+    Raises
+    ------
+    DataError
+        If the file is no split, a shape is in both lists or twice in one, or the checksum differs.
+    """
+    try:
+        content = json.loads(Path(path).read_text())
+        split = Split(content["name"], tuple(content["train"]), tuple(content["test"]), content.get("source", ""))
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DataError(f"{path}: not a split file; wanted json with name, train and test ({error!r})") from error
+    both = [*split.train, *split.test]
+    if len(set(both)) != len(both):
+        twice = sorted({name for name in both if both.count(name) > 1})
+        raise DataError(f"{path}: listed more than once: {', '.join(twice[:5])}")
+    stated = content.get("checksum", split.checksum)
+    if stated != split.checksum:
+        raise DataError(f"{path}: the lists have checksum {split.checksum}, the file states {stated}: it was edited")
+    return split

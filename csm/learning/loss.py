@@ -1,0 +1,99 @@
+"""Cross-entropy over many classes without the matrix of logits."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import torch
+from torch import Tensor
+
+Products = Literal["float32", "bfloat16"]
+
+
+def linear_cross_entropy(
+    x: Tensor,
+    weight: Tensor,
+    bias: Tensor,
+    target: Tensor,
+    *,
+    chunk: int = 256,
+    products: Products = "float32",
+) -> Tensor:
+    r"""Mean cross-entropy of the linear classifier ``x @ weight.T + bias``, computed in chunks of rows.
+
+    Equal to ``F.cross_entropy(F.linear(x, weight, bias), target)``, but the logits exist for `chunk` rows at a time,
+    and the gradients with respect to `x`, `weight` and `bias` are made in the same pass:
+
+    .. math::
+        \partial L / \partial z = (\mathrm{softmax}(z) - \mathrm{onehot}(t)) / R, \qquad z = x W^\top + b
+
+    so memory grows with ``chunk * C`` instead of ``R * C``, and the products are not made twice.
+
+    Parameters
+    ----------
+    x
+        Shape (R, D): one row per classified vertex.
+    weight, bias
+        Shapes (C, D) and (C,): the classifier over C classes.
+    target
+        Shape (R,), int64: the class of each row.
+    chunk
+        Rows at a time.
+    products
+        "float32" keeps the input's own precision (float32, or float64 when the inputs are float64);
+        "bfloat16" rounds the factors and results of the three matrix products to bfloat16, with the softmax in
+        float32: several times faster on processors with bfloat16 units, at a relative gradient error of about 3e-3.
+
+    Returns
+    -------
+    Tensor
+        The mean loss, a scalar in the precision of `x`.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit, there are no rows, or `products` is unknown.
+    """
+    if x.ndim != 2 or x.shape[1] != weight.shape[1] or bias.shape != weight.shape[:1] or target.shape != x.shape[:1]:
+        shapes = ", ".join(str(tuple(t.shape)) for t in (x, weight, bias, target))
+        raise ValueError(f"x, weight, bias, target have shapes {shapes}; wanted (R, D), (C, D), (C,), (R,)")
+    if len(x) == 0:
+        raise ValueError("there are no rows to classify")
+    if products not in ("float32", "bfloat16"):
+        raise ValueError(f'products is "float32" or "bfloat16", got {products!r}')
+    loss: Tensor = _LinearCrossEntropy.apply(x, weight, bias, target, chunk, products == "bfloat16")
+    return loss
+
+
+class _LinearCrossEntropy(torch.autograd.Function):
+    """Loss and gradients in one pass over the rows; the backward pass only scales the gradients."""
+
+    @staticmethod
+    def forward(
+        ctx: Any, x: Tensor, weight: Tensor, bias: Tensor, target: Tensor, chunk: int, low_precision: bool
+    ) -> Tensor:
+        dtype = torch.bfloat16 if low_precision else x.dtype
+        w, features = weight.to(dtype), x.to(dtype)
+        grad_x, grad_w, grad_b = torch.empty_like(x), torch.zeros_like(weight), torch.zeros_like(bias)
+        total = x.new_zeros(())
+        for begin in range(0, len(x), chunk):
+            rows = slice(begin, begin + chunk)
+            z = (features[rows] @ w.T).to(x.dtype).add_(bias)
+            t = target[rows, None]
+            log_norm = z.logsumexp(1, keepdim=True)
+            total += (log_norm - z.gather(1, t)).sum()
+            p = z.sub_(log_norm).exp_()
+            p.scatter_add_(1, t, p.new_full(t.shape, -1.0))
+            grad_b += p.sum(0)
+            p = p.to(dtype)
+            grad_x[rows] = (p @ w).to(x.dtype)
+            grad_w += (p.T @ features[rows]).to(x.dtype)
+        ctx.save_for_backward(grad_x, grad_w, grad_b)
+        ctx.rows = len(x)
+        return total / len(x)
+
+    @staticmethod
+    def backward(ctx: Any, *grad_outputs: Tensor) -> tuple[Tensor | None, ...]:
+        scale = grad_outputs[0] / ctx.rows
+        grad_x, grad_w, grad_b = ctx.saved_tensors
+        return grad_x * scale, grad_w * scale, grad_b * scale, None, None, None

@@ -1,0 +1,133 @@
+"""The LightningModule: a network, its loss and its optimiser."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, cast
+
+import lightning as L
+import torch
+from torch import Tensor
+from torch.optim import Adam
+from torch.optim.lr_scheduler import CosineAnnealingLR, LRScheduler, OneCycleLR, StepLR
+
+from csm.data.datamodule import ShapeSample
+from csm.errors import ConfigError
+from csm.learning.loss import Products, linear_cross_entropy
+from csm.networks import Basis, CorrespondenceNetwork, build
+
+Schedule = Literal["constant", "cosine", "step", "one_cycle"]
+
+FORMAT = 1
+"""Version of the hyper-parameters in a checkpoint."""
+
+
+class CSMModule(L.LightningModule):
+    """Learn to classify the template vertex of every vertex of a shape.
+
+    All hyper-parameters are plain data, so a checkpoint loads with ``weights_only=True`` and without a config.
+
+    Parameters
+    ----------
+    network
+        Name of the network and its options, for `csm.networks.build`.
+    in_channels
+        Width of the input descriptor.
+    n_classes
+        Number of template vertices.
+    descriptor
+        Name and parameters of the input descriptor, kept in the checkpoint so that it can be computed for any mesh.
+    basis_k
+        Eigenpairs of the basis that the network was trained with.
+    lr, weight_decay
+        Of Adam (betas 0.9 and 0.999, eps 1e-8).
+    schedule
+        Of the learning rate: "constant", "cosine" (to zero), "step" (halved at every third of the training) or
+        "one_cycle" (rises for 30 % of the training, then falls).
+    loss_products
+        Precision of the classifier's matrix products, see `linear_cross_entropy`.
+    training
+        How the checkpoint came about (data, split, seed), free plain data for its reader.
+    """
+
+    def __init__(
+        self,
+        network: dict[str, Any],
+        in_channels: int,
+        n_classes: int,
+        descriptor: dict[str, Any],
+        basis_k: int = 128,
+        lr: float = 1e-3,
+        weight_decay: float = 0.0,
+        schedule: Schedule = "constant",
+        loss_products: Products = "float32",
+        training: dict[str, Any] | None = None,
+        format: int = FORMAT,
+    ) -> None:
+        super().__init__()
+        self.save_hyperparameters()
+        if format != FORMAT:
+            raise ConfigError(f"the checkpoint has format {format}, this version of csm reads format {FORMAT}")
+        options = dict(network)
+        try:
+            self.network = build(options.pop("name"), in_channels, n_classes, **options)
+        except ValueError as error:
+            raise ConfigError(str(error)) from error
+        self.lr, self.weight_decay, self.schedule = lr, weight_decay, schedule
+        self.loss_products: Products = loss_products
+
+    @property
+    def _net(self) -> CorrespondenceNetwork:
+        return cast(CorrespondenceNetwork, self.network)
+
+    def forward(self, features: Tensor, basis: Basis) -> Tensor:
+        """Return the learned descriptor, shape (N, Q)."""
+        return self._net.describe(features, basis)
+
+    def loss(self, descriptor: Tensor, sample: ShapeSample) -> Tensor:
+        """Cross-entropy of the classifier over the rows with a known template point."""
+        classifier = self._net.classifier
+        rows = self._net.dropout(descriptor)[sample.rows]
+        return linear_cross_entropy(
+            rows, classifier.weight, classifier.bias, sample.classes, products=self.loss_products
+        )
+
+    def training_step(self, sample: ShapeSample) -> Tensor:
+        """One shape: loss of its labelled vertices."""
+        loss = self.loss(self(sample.features, sample.basis), sample)
+        self.log("train/loss", loss, on_step=False, on_epoch=True, prog_bar=True, batch_size=1)
+        return loss
+
+    def validation_step(self, sample: ShapeSample) -> Tensor:
+        """Return the learned descriptor of one shape; the loss is logged, the errors are a callback's business."""
+        descriptor: Tensor = self(sample.features, sample.basis)
+        self.log("val/loss", self.loss(descriptor, sample), prog_bar=True, batch_size=1)
+        return descriptor
+
+    @torch.no_grad()
+    def describe(self, sample: ShapeSample) -> Tensor:
+        """Return the learned descriptor of a shape in evaluation mode, shape (N, Q), on the CPU."""
+        self.eval()
+        basis = Basis(*(t.to(self.device) for t in sample.basis))
+        descriptor: Tensor = self(sample.features.to(self.device), basis)
+        return descriptor.cpu()
+
+    def configure_optimizers(self) -> Any:
+        """Adam with the chosen schedule, stepped once per training step."""
+        optimizer = Adam(self.parameters(), lr=self.lr, weight_decay=self.weight_decay)
+        if self.schedule == "constant":
+            return optimizer
+        steps = int(self.trainer.estimated_stepping_batches)
+        return {
+            "optimizer": optimizer,
+            "lr_scheduler": {"scheduler": self._scheduler(optimizer, steps), "interval": "step"},
+        }
+
+    def _scheduler(self, optimizer: Adam, steps: int) -> LRScheduler:
+        match self.schedule:
+            case "cosine":
+                return CosineAnnealingLR(optimizer, steps)
+            case "step":
+                return StepLR(optimizer, max(1, steps // 3), gamma=0.5)
+            case "one_cycle":
+                return OneCycleLR(optimizer, self.lr, total_steps=steps)
+        raise ConfigError(f"schedule is constant, cosine, step or one_cycle, got {self.schedule!r}")

@@ -1,0 +1,79 @@
+from __future__ import annotations
+
+import pytest
+import torch
+
+from csm.networks import CSMCNN, build
+from tests.networks.test_csmconv import basis_of
+from tests.shapes import blob
+
+
+def parameters(**options) -> int:
+    net = CSMCNN(options.pop("p"), 6890, **options)
+    return sum(p.numel() for p in net.parameters())
+
+
+@pytest.mark.parametrize(
+    ("options", "count"),
+    [
+        ({"p": 48, "terms": 6}, 1_906_602),
+        ({"p": 48, "terms": 6, "normalisation": "none"}, 1_905_450),
+        ({"p": 48, "terms": 5}, 1_890_218),
+        ({"p": 140, "terms": 6}, 1_912_490),
+        ({"p": 140, "terms": 6, "normalisation": "none"}, 1_911_338),
+        ({"p": 140, "terms": 5}, 1_896_106),
+        ({"p": 140, "terms": 5, "normalisation": "none"}, 1_894_954),
+    ],
+)
+def test_parameter_counts(options, count):
+    assert parameters(**options) == count
+
+
+@pytest.fixture(scope="module")
+def basis():
+    mesh = blob(3)
+    return basis_of(mesh, 24)
+
+
+@pytest.mark.parametrize("normalisation", ["batch", "instance", "none"])
+@pytest.mark.parametrize("activation", ["relu", "elu", "leaky_relu", "gelu"])
+def test_every_option_runs_and_learns(basis, normalisation, activation):
+    torch.manual_seed(0)
+    net = CSMCNN(4, 30, (8, 8, 16), 12, ks=20, terms=3, normalisation=normalisation, activation=activation).double()
+    x = torch.randn(len(basis.mass), 4, dtype=torch.float64)
+    assert net.describe(x, basis).shape == (len(basis.mass), 12)
+    net(x, basis).square().sum().backward()
+    assert all(p.grad is not None and torch.isfinite(p.grad).all() for p in net.parameters())
+
+
+def test_relabelling_the_vertices_permutes_the_descriptor(basis):
+    net = CSMCNN(4, 30, ks=20).double().eval()
+    x = torch.randn(len(basis.mass), 4, dtype=torch.float64)
+    order = torch.randperm(len(basis.mass))
+    moved = basis._replace(evecs=basis.evecs[order], mass=basis.mass[order])
+    torch.testing.assert_close(net.describe(x[order], moved), net.describe(x, basis)[order])
+
+
+def test_sign_flips_leave_the_network_unchanged(basis):
+    net = CSMCNN(4, 30, ks=20).double().eval()
+    x = torch.randn(len(basis.mass), 4, dtype=torch.float64)
+    flipped = basis._replace(evecs=-basis.evecs)
+    torch.testing.assert_close(net.describe(x, flipped), net.describe(x, basis))
+
+
+def test_instance_normalisation_gives_each_channel_mean_zero_and_variance_one(basis):
+    net = CSMCNN(4, 30, ks=20, normalisation="instance").double()
+    y = net.finish[0][0](torch.randn(len(basis.mass), 64, dtype=torch.float64) * 5 + 3)
+    assert y.mean(0).abs().max() < 1e-9
+    torch.testing.assert_close(y.var(0, unbiased=False), torch.ones(64, dtype=torch.float64), atol=1e-5, rtol=0)
+
+
+def test_unknown_names_are_answered_with_the_known_ones():
+    with pytest.raises(ValueError, match="known are csmcnn"):
+        build("gcn", 3, 4)
+    with pytest.raises(ValueError, match="network csmcnn"):
+        build("csmcnn", 3, 4, widht=3)
+    with pytest.raises(ValueError, match="relu"):
+        CSMCNN(3, 4, activation="sine")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="instance"):
+        CSMCNN(3, 4, normalisation="layer")  # type: ignore[arg-type]
