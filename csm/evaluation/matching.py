@@ -1,0 +1,116 @@
+"""From two descriptor matrices to a point-to-point map: the nearest neighbour in descriptor space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from csm._types import IntArray
+from csm.errors import ConfigError
+
+Rows: TypeAlias = NDArray[Any] | torch.Tensor
+_MAX_ELEMENTS = 2**25  # of one block of distances: 128 MiB in float32
+
+
+@dataclass(frozen=True, eq=False)
+class Match:
+    """A map from every vertex of one shape to a vertex of another.
+
+    Parameters
+    ----------
+    indices
+        Shape (N_source,), 0-based: entry i is the vertex of the target that vertex i of the source goes to.
+    n_target
+        Number of vertices of the target.
+    source, target
+        Names of the shapes.
+    """
+
+    indices: IntArray
+    n_target: int
+    source: str = ""
+    target: str = ""
+
+    @property
+    def coverage(self) -> float:
+        """Fraction of target vertices that something is mapped to."""
+        return len(np.unique(self.indices)) / self.n_target
+
+
+def match_features(source: Rows, target: Rows, *, source_name: str = "", target_name: str = "") -> Match:
+    """Match each of N_source rows to the nearest of N_target rows (see `nearest`)."""
+    return Match(nearest(source, target), len(target), source_name, target_name)
+
+
+def nearest(queries: Rows, candidates: Rows, *, block: int = 2048) -> IntArray:
+    """Find the nearest candidate (Euclidean) of each query, in blocks of bounded memory.
+
+    float32 rows are compared by float32 products first; queries for which rounding could decide are done again in
+    float64.  Of candidates that float64 products cannot tell apart the one with the lowest index is taken, so the
+    answer depends on neither the block size nor the number of threads.
+
+    Parameters
+    ----------
+    queries
+        Shape (N, Q), numpy or torch, float32 or float64 (others are taken as float32).
+    candidates
+        Shape (N', Q), the same kind of number.
+    block
+        Queries at a time; fewer when N' is so large that a block of distances would exceed 2^25 numbers.
+
+    Returns
+    -------
+    IntArray
+        Shape (N,), indices into `candidates`.
+
+    Raises
+    ------
+    ConfigError
+        If the widths differ, there is no candidate, or a number is not finite.
+
+    Examples
+    --------
+    >>> nearest(np.array([[0.9, 0.0], [0.0, 0.2]]), np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.0]]))
+    array([1, 0])
+    """
+    q, c = _tensor(queries), _tensor(candidates)
+    if q.ndim != 2 or c.ndim != 2 or q.shape[1] != c.shape[1] or len(c) == 0:
+        raise ConfigError(f"nearest: {tuple(q.shape)} against {tuple(c.shape)}; wanted (N, Q) and (N', Q) with N' > 0")
+    if q.dtype != c.dtype:
+        q, c = q.double(), c.double()
+    with torch.no_grad():
+        if not (torch.isfinite(q).all() and torch.isfinite(c).all()):
+            raise ConfigError(
+                "nearest: a descriptor is not finite, so it has no nearest neighbour; look at the features"
+            )
+        centre = c.mean(0)
+        found, unsure = _search(q - centre, c - centre, block)
+        if c.dtype != torch.float64 and unsure.any():
+            found[unsure] = _search(q[unsure].double() - centre, c.double() - centre, block)[0]
+    return found.cpu().numpy()
+
+
+def _tensor(rows: Rows) -> torch.Tensor:
+    tensor = torch.as_tensor(rows).detach()
+    return tensor if tensor.dtype in (torch.float32, torch.float64) else tensor.float()
+
+
+def _search(q: torch.Tensor, c: torch.Tensor, block: int) -> tuple[torch.Tensor, torch.Tensor]:
+    """Return the first candidate within rounding of the nearest, and whether there are others."""
+    rows = max(1, min(block, _MAX_ELEMENTS // len(c)))
+    half_norms = 0.5 * c.square().sum(1)
+    rounding = 4.0 * c.shape[1] ** 0.5 * torch.finfo(c.dtype).eps * half_norms.max().sqrt()
+    found = torch.empty(len(q), dtype=torch.int64, device=q.device)
+    unsure = torch.empty(len(q), dtype=torch.bool, device=q.device)
+    for begin in range(0, len(q), rows):
+        part = q[begin : begin + rows]
+        score = torch.addmm(half_norms, part, c.T, alpha=-1.0)  # half the squared distance, less |q|^2 / 2
+        limit = score.amin(1) + rounding * (part.norm(dim=1) + half_norms.max().sqrt())
+        close = score <= limit[:, None]
+        found[begin : begin + rows] = close.to(torch.uint8).argmax(1)
+        unsure[begin : begin + rows] = close.sum(1) > 1
+    return found, unsure

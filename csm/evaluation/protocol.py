@@ -1,0 +1,230 @@
+"""Which pairs of shapes are compared, how far a miss is, and by what it is divided; and the evaluation that follows."""
+
+from __future__ import annotations
+
+import itertools
+import multiprocessing
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Literal, TypeAlias, get_args
+
+import numpy as np
+from tqdm import tqdm
+
+from csm._types import IntArray
+from csm.errors import ConfigError, DataError
+from csm.evaluation.distances import MatchedPoints, TargetErrors, target_errors
+from csm.evaluation.metrics import FLIP_MARGIN
+from csm.evaluation.results import Evaluation, PairErrors, summarise
+from csm.mesh.correspondence import PointMap, ground_truth
+from csm.mesh.shape import Mesh
+from csm.operators.geodesic import Method
+
+Normaliser: TypeAlias = Literal["diameter", "sqrt_area"]
+Pair: TypeAlias = tuple[str, str]
+_DISTANCES = {
+    "exact": "exact geodesic distance",
+    "heat": "geodesic distance by the heat method",
+    "edge": "shortest path along edges",
+}
+_NORMALISERS = {
+    "diameter": "geodesic diameter of the target (the same distance, double sweep, a lower bound)",
+    "sqrt_area": "square root of the area of the target",
+}
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """The facts that a number needs beside it.
+
+    Parameters
+    ----------
+    pairs
+        "all": every ordered pair of different shapes; or a list of (source, target) names.
+    sample
+        How many of these pairs are drawn without replacement; None for all.
+    seed
+        Of the draw.
+    distance
+        Kind of distance between the true and the matched vertex; see `csm.operators.geodesic`.
+    normaliser
+        What distances are divided by: "diameter" (the ACD paper) or "sqrt_area" (functional maps).
+    """
+
+    pairs: Literal["all"] | Sequence[Pair] = "all"
+    sample: int | None = None
+    seed: int = 0
+    distance: Method = "exact"
+    normaliser: Normaliser = "diameter"
+
+    def __post_init__(self) -> None:
+        for what, value, known in (
+            ("distance", self.distance, get_args(Method)),
+            ("normaliser", self.normaliser, get_args(Normaliser)),
+        ):
+            if value not in known:
+                raise ConfigError(f"protocol: {what}={value!r} is unknown; choose one of {', '.join(known)}")
+        if isinstance(self.pairs, str) and self.pairs != "all":
+            raise ConfigError(f'protocol: pairs={self.pairs!r} is unknown; wanted "all" or a list of name pairs')
+        if self.sample is not None and self.sample < 1:
+            raise ConfigError(f"protocol: sample={self.sample}; wanted a number of pairs from 1, or none for all")
+
+    def choose(self, names: Sequence[str]) -> list[Pair]:
+        """Return the (source, target) pairs to evaluate among shapes of these names.
+
+        Examples
+        --------
+        >>> Protocol().choose(["a", "b"])
+        [('a', 'b'), ('b', 'a')]
+        """
+        if isinstance(self.pairs, str):
+            pairs = list(itertools.permutations(names, 2))
+        else:
+            pairs = [(source, target) for source, target in self.pairs]
+        unknown = sorted({name for pair in pairs for name in pair} - set(names))
+        if unknown:
+            raise DataError(f"the pair list names {unknown[0]!r} and {len(unknown) - 1} more that are not in the set")
+        if not pairs:
+            raise DataError(f"there is no pair to evaluate: {len(names)} shapes, pairs={self.pairs!r}")
+        if self.sample is not None and self.sample < len(pairs):
+            kept = np.random.default_rng(self.seed).choice(len(pairs), self.sample, replace=False)
+            pairs = [pairs[i] for i in sorted(kept)]
+        return pairs
+
+    def describe(self, n_pairs: int | None = None) -> str:
+        """Say the protocol in words, for captions and result files.
+
+        Examples
+        --------
+        >>> Protocol(sample=50, seed=1, distance="edge", normaliser="sqrt_area").describe()[:58]
+        '50 pairs (drawn with seed 1 from all ordered pairs without'
+        """
+        which = "all ordered pairs without self-pairs" if self.pairs == "all" else "a given list of pairs"
+        if self.sample is not None:
+            which = f"drawn with seed {self.seed} from {which}"
+            n_pairs = self.sample if n_pairs is None else n_pairs
+        return (
+            f"{'' if n_pairs is None else f'{n_pairs} '}pairs ({which}); error = {_DISTANCES[self.distance]} on the "
+            f"target from the true to the matched vertex, divided by the {_NORMALISERS[self.normaliser]}; "
+            "mean over all template points known on both shapes, pooled over pairs; a match on another component "
+            f"counts as one diameter; left-right flip: nearer to the mirrored truth by more than {FLIP_MARGIN:g}."
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class EvalShape:
+    """A shape to be matched, with its ground truth.
+
+    Parameters
+    ----------
+    name
+        Unique in an evaluation.
+    mesh
+        N vertices.
+    truth
+        Where the template points lie on the mesh.
+    mirror
+        Where they lie on it after exchanging left and right, if that is known.
+    """
+
+    name: str
+    mesh: Mesh
+    truth: PointMap
+    mirror: PointMap | None = None
+
+
+Matcher: TypeAlias = Callable[[EvalShape, EvalShape], IntArray]
+
+
+def evaluate_matches(
+    shapes: Sequence[EvalShape], match: Matcher, protocol: Protocol, progress: bool = True, *, workers: int = 1
+) -> Evaluation:
+    """Match every pair of the protocol and measure the errors.
+
+    Parameters
+    ----------
+    shapes
+        With unique names.
+    match
+        Called as ``match(source, target)``, target by target; gives for each vertex of the source a vertex of the
+        target, shape (N_source,).
+    protocol
+        Which pairs, distance and normaliser.
+    progress
+        Show a bar with the names of the shapes.
+    workers
+        Processes that measure distances while this one goes on matching; 1 measures in this process.  More than one
+        needs the caller's script to be importable (``if __name__ == "__main__"``), as with any process pool.
+
+    Raises
+    ------
+    DataError
+        If names repeat or are unknown, shapes have no template point in common, or a match has the wrong shape.
+    """
+    by_name = {shape.name: shape for shape in shapes}
+    if len(by_name) != len(shapes):
+        raise DataError(f"{len(shapes)} shapes have only {len(by_name)} different names; each needs its own")
+    pairs = protocol.choose(list(by_name))
+    started = time.perf_counter()
+    jobs: dict[str, Future[TargetErrors]] = {}
+    asked: dict[str, list[MatchedPoints]] = {}
+    with tqdm(total=len(pairs), unit="pair", disable=not progress) as bar, _pool(workers) as submit:
+        for target, sources in _by_target(pairs).items():
+            asked[target] = []
+            for source in sources:
+                bar.set_postfix_str(f"{source} -> {target}")
+                asked[target].append(_matched_points(by_name[source], by_name[target], match))
+            args = by_name[target].mesh, protocol.distance, protocol.normaliser, asked[target]
+            jobs[target] = submit(target_errors, *args)
+            jobs[target].add_done_callback(partial(_advance, bar, len(sources)))
+        answers = {target: job.result() for target, job in jobs.items()}
+    position = {target: iter(zip(asked[target], answers[target].errors, strict=True)) for target in asked}
+    measured = [PairErrors(pair, *next(position[pair[1]]), answers[pair[1]].lengths) for pair in pairs]
+    return summarise(measured, protocol, time.perf_counter() - started)
+
+
+def _by_target(pairs: Sequence[Pair]) -> dict[str, list[str]]:
+    sources: dict[str, list[str]] = {}
+    for source, target in pairs:
+        sources.setdefault(target, []).append(source)
+    return sources
+
+
+def _matched_points(source: EvalShape, target: EvalShape, match: Matcher) -> MatchedPoints:
+    points = ground_truth(source.truth, target.truth)
+    matched = np.asarray(match(source, target))
+    n, m = source.mesh.n_vertices, target.mesh.n_vertices
+    if matched.shape != (n,) or matched.dtype.kind not in "iu" or matched.min() < 0 or matched.max() >= m:
+        raise DataError(
+            f"{source.name} -> {target.name}: the match is {matched.dtype} of shape {matched.shape}; wanted {n} "
+            f"integers in 0..{m - 1}"
+        )
+    mirror = None
+    if target.mirror is not None:
+        s, t = source.truth.as_template_to_shape(), target.truth.as_template_to_shape()
+        both = (s.indices >= 0) & (t.indices >= 0)
+        mirror = target.mirror.as_template_to_shape(t.n_from).indices[both]
+    return MatchedPoints(points.target, matched[points.source].astype(np.int64), mirror)
+
+
+def _advance(bar: tqdm[Any], n_pairs: int, _: Future[TargetErrors]) -> None:
+    bar.update(n_pairs)
+
+
+@contextmanager
+def _pool(workers: int) -> Iterator[Callable[..., Future[Any]]]:
+    if workers <= 1:
+        yield _at_once
+        return
+    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+        yield pool.submit
+
+
+def _at_once(function: Callable[..., Any], *args: Any) -> Future[Any]:
+    done: Future[Any] = Future()
+    done.set_result(function(*args))
+    return done
