@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from types import MappingProxyType
 
 from csm.data.folderset import Entry, FirstVertices, FolderSet, Missing, SameFaces
 from csm.data.kinds import (
@@ -99,9 +98,7 @@ def _acd_release(folder: Path) -> FolderSet | None:
     present = {part: path for part, path in files.items() if _exists(path)}
     lists = {part: tuple(read_names(path)) for part, path in present.items()}
     entries = tuple(Entry(stem, path, labels.get(stem)) for stem, path in meshes.items())
-    return FolderSet(
-        name, kind, folder, entries, lists=MappingProxyType(lists), missing=missing, extras=tuple(present.values())
-    )
+    return FolderSet(name, kind, folder, entries, lists=lists, missing=missing, extras=tuple(present.values()))
 
 
 def _lps(folder: Path) -> FolderSet | None:
@@ -122,6 +119,8 @@ def _lps(folder: Path) -> FolderSet | None:
 
 def _sga18(folder: Path) -> FolderSet | None:
     """`vtx_5k/NAME.off`, `vtx_5k/corres/NAME.vts` and `NAME.sym.vts`, `test_pairs.txt`."""
+    if folder.resolve().name == "vtx_5k":
+        folder = folder.resolve().parent
     meshes = _stems(list_files(folder / "vtx_5k", ".off"))
     if not meshes:
         return None

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from types import MappingProxyType
 
 from csm.data.kinds import Kind
 from csm.data.shapeset import Shape
@@ -92,7 +91,7 @@ class FolderSet:
     root: Path
     entries: tuple[Entry, ...]
     pairs: tuple[tuple[str, str], ...] = ()
-    lists: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: MappingProxyType({}))
+    lists: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     missing: tuple[Missing, ...] = ()
     extras: tuple[Path, ...] = ()
 
@@ -148,8 +147,11 @@ class FolderSet:
         csm.errors.MeshError
             If the mesh file cannot be used.
         """
+        return self.with_maps(name, self.mesh(name))
+
+    def with_maps(self, name: str, mesh: Mesh) -> Shape:
+        """Join a mesh of this set that is already read with its maps; raises as `load` does."""
         entry = self.entry(name)
-        mesh = read_mesh(entry.mesh, name)
         mirror = None if entry.mirror is None else _read_map(entry.mirror, mesh)
         return Shape(mesh, self._truth(entry, mesh), mirror)
 

@@ -126,12 +126,14 @@ class _Topology:
         return np.bincount(self.edge_of)[self.edge_of]
 
 
-def _found(kind: str, severity: Severity, what: str, where: NDArray[np.integer], count: int | None = None) -> Finding:
-    """Make a finding whose text is the count, the phrase and the first offenders."""
+def _found(
+    kind: str, severity: Severity, what: str, where: NDArray[np.integer], count: int | None = None, at: str = ""
+) -> Finding:
+    """Make a finding whose text is the phrase, the count and the first offenders."""
     count = len(where) if count is None else count
     first = tuple(int(i) for i in where[:_N_FIRST])
-    shown = ", ".join(map(str, first)) + (", ..." if len(where) > len(first) else "")
-    return Finding(kind, count, first, severity, f"{count} {what}" + (f" ({shown})" if first else ""))
+    shown = at + ", ".join(map(str, first)) + (", ..." if len(where) > len(first) else "")
+    return Finding(kind, count, first, severity, f"{what}: {count} ({shown})")
 
 
 def _non_finite(t: _Topology) -> Iterator[Finding]:
@@ -189,11 +191,11 @@ def _edges(t: _Topology) -> Iterator[Finding]:
     border = t.proper & (t.edge_uses == 1)
     if border.any():
         where = np.unique(t.tails[border])
-        yield _found("boundary", "note", "boundary edges, at vertices", where, int(border.sum()))
+        yield _found("boundary", "note", "boundary edges", where, int(border.sum()), "at vertices ")
     crowded = np.unique(t.edge_of[t.proper & (t.edge_uses > 2)], return_index=True)
     if crowded[0].size:
         where = np.flatnonzero(t.proper & (t.edge_uses > 2))[crowded[1]]
-        yield _found("non_manifold_edges", "note", "edges with more than two faces, at vertices", t.tails[where])
+        yield _found("non_manifold_edges", "note", "edges with more than two faces", t.tails[where], at="at vertices ")
     yield from _orientation(t)
 
 
@@ -203,8 +205,8 @@ def _orientation(t: _Topology) -> Iterator[Finding]:
     wrong = np.flatnonzero(t.proper & (t.edge_uses == 2) & (balance != 0))
     edges, index = np.unique(t.edge_of[wrong], return_index=True)
     if edges.size:
-        what = "edges whose two faces are oriented against each other, at vertices"
-        yield _found("inconsistent_orientation", "note", what, t.tails[wrong[index]])
+        what = "edges whose two faces are oriented against each other"
+        yield _found("inconsistent_orientation", "note", what, t.tails[wrong[index]], at="at vertices ")
     elif t.mesh.n_faces and (t.edge_uses == 2).all() and np.isfinite(t.mesh.vertices).all() and _volume(t.mesh) < 0:
         yield Finding("inside_out", t.mesh.n_faces, (), "note", "all faces are oriented inwards")
 
@@ -245,7 +247,7 @@ def _components(t: _Topology) -> Iterator[Finding]:
     first = used[np.unique(label[used], return_index=True)[1]]
     if len(first) > 1:
         where = np.sort(first)
-        yield _found("several_components", "note", "components, with first vertices", where)
+        yield _found("several_components", "note", "components", where, at="first vertices ")
 
 
 def _graph(rows: IntArray, columns: IntArray, n: int) -> coo_array:

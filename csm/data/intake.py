@@ -1,0 +1,135 @@
+"""Take in a data set as its authors publish it: unpack, recognise, check, and lay out where csm finds it."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from csm.data.folder import find_sets, recognise
+from csm.data.folderset import FolderSet
+from csm.data.inspection import Inspected, inspect
+from csm.data.kinds import Kind
+from csm.errors import CsmError, DataError
+from csm.mesh.io import copy_file, unpacked
+
+
+@dataclass(frozen=True, eq=False)
+class TakenIn:
+    """A set in its new place, with what was found about each shape."""
+
+    shapes: FolderSet
+    rows: tuple[Inspected, ...]
+
+    def __str__(self) -> str:
+        bad = [f"  {row.name}: {why}" for row in self.rows if not row.usable for why in _why(row)]
+        noted = sum(bool(row.findings) for row in self.rows if row.usable)
+        n_missing = len(self.shapes.missing)
+        head = (
+            f"{self.shapes.root}: {self.shapes.kind.title}, {len(self.rows)} shapes, {len(self.shapes.mapped)} with "
+            f"correspondence, {noted} with notes, {len(self.rows) - sum(r.usable for r in self.rows)} unusable, "
+            f"{n_missing} files missing" + (" (csm check lists them)" if n_missing else "")
+        )
+        return "\n".join([head, *bad])
+
+
+def take_in(source: Path, out: Path, kinds: Sequence[Kind], progress: bool = True) -> list[TakenIn]:
+    """Copy every set of the wanted kinds out of an archive or folder to `out/NAME`, and check it there.
+
+    Parameters
+    ----------
+    source
+        Archive (.zip, .tar, .tar.xz, ...) or folder as published; it is only read.
+    out
+        Folder that gets one folder per set.
+    kinds
+        What to look for.
+    progress
+        Show a progress bar with the shape's name.
+
+    Raises
+    ------
+    DataError
+        If the source holds no set of these kinds, or `out/NAME` is the source itself.
+    """
+    with unpacked(source) as folder:
+        found = [shapes for shapes in find_sets(folder) if shapes.kind in kinds]
+        if not found:
+            raise DataError(f"{source}: holds no {_any_of(kinds)}. Where to get it: {_origins(kinds)}")
+        placed = [lay_out(shapes, out / shapes.name) for shapes in found]
+    return [TakenIn(shapes, inspect(shapes, progress)) for shapes in placed]
+
+
+def lay_out(shapes: FolderSet, target: Path) -> FolderSet:
+    """Copy the files of a set to a folder, in the same layout, and return the set that is recognised there.
+
+    Raises
+    ------
+    DataError
+        If `target` lies in the set's own folder or the set has no shapes.
+    """
+    if target.resolve().is_relative_to(shapes.root.resolve()):
+        raise DataError(
+            f"{target}: lies in the source folder {shapes.root}, which is not changed; choose another place"
+        )
+    if not shapes.entries:
+        raise DataError(f"{shapes.root}: this {shapes.kind.title} folder has no shapes; {shapes.kind.origin}")
+    for path in shapes.files:
+        copy_file(path, target / path.relative_to(shapes.root))
+    return recognise(target)
+
+
+def script(
+    title: str, kinds: Sequence[Kind], argv: Sequence[str] | None = None, fill: Callable[[FolderSet], str] | None = None
+) -> int:
+    """Run a script of `data_prep/`: parse the arguments, take the sets in, report.
+
+    Parameters
+    ----------
+    title
+        First line of the help.
+    kinds
+        What the script takes in.
+    argv
+        Arguments; by default the process's.
+    fill
+        Fills the store for one set and returns what to print; offered as `--store`.
+
+    Returns
+    -------
+    int
+        Exit status: 0, 1 if some shape cannot be used, 2 after an error that the user can mend.
+    """
+    parser = argparse.ArgumentParser(
+        description=title,
+        epilog="csm downloads nothing. Where to get it: " + _origins(kinds),
+    )
+    parser.add_argument("source", nargs="+", type=Path, help="archives (.zip, .tar.xz, ...) or folders as published")
+    parser.add_argument("--out", type=Path, required=True, help="folder that gets one folder per set")
+    if fill:
+        parser.add_argument("--store", action="store_true", help="compute bases and descriptors, too")
+    options = parser.parse_args(argv)
+    try:
+        taken = [t for source in options.source for t in take_in(source, options.out, kinds)]
+        for one in taken:
+            print(one)
+            if fill and options.store:
+                print(fill(one.shapes))
+    except CsmError as error:
+        print(f"{parser.prog}: {error}", file=sys.stderr)
+        return 2
+    return 0 if all(row.usable for one in taken for row in one.rows) else 1
+
+
+def _why(row: Inspected) -> list[str]:
+    return [*row.problems, *(finding.text for finding in row.findings if finding.severity == "error")]
+
+
+def _any_of(kinds: Sequence[Kind]) -> str:
+    return " or ".join(kind.title for kind in kinds) + " set"
+
+
+def _origins(kinds: Sequence[Kind]) -> str:
+    return "; ".join(f"{kind.title}: {kind.origin}" for kind in kinds)
