@@ -106,8 +106,15 @@ class ACD:
 
 
 def chebyshev_block(spectrum: Spectrum, order: int) -> FloatArray:
-    """Return sum_k T_d(2 lambda_k / lambda_K - 1) phi_k^2 for d = 0 .. `order`, shape (N, order + 1)."""
-    argument = 2 * spectrum.evals / spectrum.evals[-1] - 1
+    """Return sum_k T_d(2 lambda_k / lambda_K - 1) phi_k^2 for d = 0 .. `order`, shape (N, order + 1).
+
+    Raises
+    ------
+    NumericalError
+        If lambda_K is zero, because the mesh has K components or more.
+    """
+    greatest = spectrum.evals[spectrum.n_zero :].max()
+    argument = 2 * spectrum.evals / greatest - 1
     weights: FloatArray = np.polynomial.chebyshev.chebvander(argument, order)
     return spectrum.evecs**2 @ weights
 

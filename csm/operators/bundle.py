@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from csm._types import Arrays, FloatArray
+from csm.mesh.check import require_usable
 from csm.mesh.shape import Mesh
 from csm.operators.frames import FrameKind, face_frames
 from csm.operators.laplacian import (
@@ -56,6 +57,7 @@ class Operators:
     """
 
     def __init__(self, mesh: Mesh, *, unit_area: bool = True, memo: Memo | None = None) -> None:
+        require_usable(mesh)
         self.mesh = mesh.unit_area() if unit_area else mesh
         self._memo = memo
         self._areas: FloatArray | None = None

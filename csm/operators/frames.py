@@ -116,7 +116,7 @@ def smooth(mesh: Mesh, tensors: FloatArray, sweeps: int) -> FloatArray:
     mean = sparse.csr_array(sparse.diags_array(1.0 / ring.sum(axis=1)) @ ring)
     flat = tensors.reshape(n, 9)
     for _ in range(sweeps):
-        flat = mean @ flat
+        flat = np.asarray(mean @ flat)
     return flat.reshape(n, 3, 3)
 
 

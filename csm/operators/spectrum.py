@@ -53,6 +53,22 @@ class Spectrum:
             raise ConfigError(f"asked for the first {k} of {len(self.evals)} eigenpairs; compute more of them")
         return replace(self, evals=self.evals[:k], evecs=self.evecs[:, :k])
 
+    @property
+    def n_zero(self) -> int:
+        """Number of zero eigenvalues (below 1e-8 over the area): one per component of the mesh.
+
+        Raises
+        ------
+        NumericalError
+            If all are zero, because the mesh has at least K components; ask for more pairs.
+        """
+        count = int(np.searchsorted(self.evals, 1e-8 / self.mass.sum()))
+        if count == len(self.evals):
+            raise NumericalError(
+                f"all {count} eigenvalues are zero, one per component of the mesh; ask for more of them"
+            )
+        return count
+
 
 def eigenpairs(stiffness: sparse.csr_array, mass: FloatArray, k: int, *, name: str = "mesh") -> Spectrum:
     """Return the `k` smallest eigenpairs of  S phi = lambda diag(mass) phi.

@@ -1,0 +1,80 @@
+"""The heat kernel signature (HKS)."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from csm._types import FloatArray
+from csm.descriptors.base import Features, as_operators
+from csm.errors import ConfigError
+from csm.mesh.shape import Mesh
+from csm.operators.bundle import Operators
+
+
+@dataclass(frozen=True)
+class HKS:
+    r"""Heat left at a point after a time t, for logarithmically spaced times.
+
+    .. math:: h_t(x) = \sum_{k=1}^{K} e^{-\lambda_k t} \, \phi_k(x)^2
+
+    with times from 4 ln 10 / lambda_K to 4 ln 10 / lambda_2, where lambda_2 is the first eigenvalue that is not zero.
+
+    Parameters
+    ----------
+    k
+        K, number of eigenpairs.
+    n_times
+        Number of times, so of columns.
+    scaled
+        Divide each column by the heat trace, the sum of exp(-lambda_k t).
+
+    Raises
+    ------
+    ConfigError
+        If `k` or `n_times` is below 2.
+
+    References
+    ----------
+    Sun, Ovsjanikov, Guibas, "A concise and provably informative multi-scale signature based on heat diffusion",
+    SGP 2009.
+    """
+
+    k: int = 300
+    n_times: int = 100
+    scaled: bool = True
+
+    name: ClassVar[str] = "hks"
+
+    def __post_init__(self) -> None:
+        if self.k < 2 or self.n_times < 2:
+            raise ConfigError(f"{self}: wanted k and n_times of at least 2")
+
+    def __call__(self, shape: Mesh | Operators) -> Features:
+        """Return the descriptor of every vertex, (N, n_times), in units of 1/area."""
+        spectrum = as_operators(shape).lbo(self.k)
+        times = heat_times(spectrum.evals[spectrum.n_zero], spectrum.evals[-1], self.n_times)
+        return Features(
+            heat_kernel_signature(spectrum.evals, spectrum.evecs, times, scaled=self.scaled),
+            tuple(f"t={t:.3g}" for t in times),
+        )
+
+    def parameters(self) -> dict[str, Any]:
+        """Return every parameter as plain data."""
+        return asdict(self)
+
+
+def heat_times(first: float, last: float, n: int) -> FloatArray:
+    """Return `n` logarithmically spaced times, ascending, from 4 ln 10 / `last` to 4 ln 10 / `first` eigenvalue."""
+    scale = 4 * np.log(10)
+    return np.geomspace(scale / last, scale / first, n)
+
+
+def heat_kernel_signature(evals: FloatArray, evecs: FloatArray, times: FloatArray, *, scaled: bool) -> FloatArray:
+    """Return sum_k exp(-lambda_k t) phi_k^2 for every vertex and time, (N, T), over the heat trace if `scaled`."""
+    decay = np.exp(-np.outer(evals, times))
+    if scaled:
+        decay /= decay.sum(axis=0)
+    return evecs**2 @ decay
