@@ -9,7 +9,7 @@ Examples
 from csm.descriptors.base import Descriptor, Features
 from csm.descriptors.chebyshev import ACD
 from csm.descriptors.heat import HKS
-from csm.descriptors.presets import PRESETS, preset
+from csm.descriptors.presets import PRESETS, from_parameters, preset
 from csm.descriptors.wave import WKS
 
-__all__ = ["ACD", "HKS", "PRESETS", "WKS", "Descriptor", "Features", "preset"]
+__all__ = ["ACD", "HKS", "PRESETS", "WKS", "Descriptor", "Features", "from_parameters", "preset"]

@@ -45,3 +45,26 @@ def preset(name: str, **overrides: Any) -> Descriptor:
         raise ConfigError(f"{name} has no parameter {', '.join(unknown)}; it has {', '.join(known)}")
     changed: Descriptor = replace(descriptor, **overrides)
     return changed
+
+
+def from_parameters(name: str, **parameters: Any) -> Descriptor:
+    """Return the descriptor of a family with all its parameters, as a checkpoint or the store records it.
+
+    Raises
+    ------
+    ConfigError
+        If the family or a parameter is unknown, or a value is out of range.
+
+    Examples
+    --------
+    >>> from_parameters("hks", **HKS(n_times=16).parameters()) == HKS(n_times=16)
+    True
+    """
+    families: dict[str, Any] = {family.name: family for family in (ACD, HKS, WKS)}
+    if name not in families:
+        raise ConfigError(f"there is no descriptor family {name!r}; there are {', '.join(families)}")
+    try:
+        descriptor: Descriptor = families[name](**parameters)
+    except TypeError as error:
+        raise ConfigError(f"descriptor {name}: {error}") from error
+    return descriptor

@@ -16,7 +16,8 @@ from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.operators.frames import FaceFrames
 
-AREA_FLOOR = 1e-8  # of the mean face area
+AREA_FLOOR = 1e-7
+"""Least area, as a fraction of its longest edge squared, that a face has in a stiffness matrix."""
 
 
 def vertex_areas(mesh: Mesh) -> FloatArray:
@@ -26,11 +27,11 @@ def vertex_areas(mesh: Mesh) -> FloatArray:
 
 
 def degenerate_faces(mesh: Mesh) -> IntArray:
-    """Return the faces whose area is below `AREA_FLOOR` of the mean; the stiffness takes them at that floor instead.
+    """Return the faces thinner than `AREA_FLOOR`, which stiffness matrices take to have that area.
 
     Their true stiffness is (nearly) infinite.  The floor keeps it finite and still ties the three corners together.
     """
-    return np.flatnonzero(mesh.face_areas < AREA_FLOOR * mesh.face_areas.mean())
+    return np.flatnonzero(mesh.face_areas < _least_areas(mesh))
 
 
 def stiffness(mesh: Mesh) -> sparse.csr_array:
@@ -100,6 +101,11 @@ def _opposite_edges(mesh: Mesh) -> FloatArray:
     return mesh.corners[:, [2, 0, 1]] - mesh.corners[:, [1, 2, 0]]
 
 
+def _least_areas(mesh: Mesh) -> FloatArray:
+    longest: FloatArray = np.linalg.norm(_opposite_edges(mesh), axis=2).max(axis=1)
+    return AREA_FLOOR * longest**2
+
+
 @dataclass(frozen=True, eq=False)
 class _Pattern:
     """Where the nine products of every face go in one CSR matrix."""
@@ -115,8 +121,9 @@ class _Pattern:
         rows, columns = np.repeat(mesh.faces, 3, axis=1).ravel(), np.tile(mesh.faces, (1, 3)).ravel()
         keys, slots = np.unique(rows * n + columns, return_inverse=True)
         indptr = np.concatenate([[0], np.cumsum(np.bincount(keys // n, minlength=n))])
-        areas = np.maximum(mesh.face_areas, AREA_FLOOR * mesh.face_areas.mean())
-        return cls(slots, (keys % n).astype(np.int32), indptr.astype(np.int32), 0.25 / areas)
+        areas = np.maximum(mesh.face_areas, _least_areas(mesh))
+        inverse = np.divide(0.25, areas, out=np.zeros_like(areas), where=areas > 0)  # 0: all corners in one point
+        return cls(slots, (keys % n).astype(np.int32), indptr.astype(np.int32), inverse)
 
     def assemble(self, products: FloatArray) -> sparse.csr_array:
         weighted = (products * self.quarter_inverse_areas[:, None, None]).ravel()
