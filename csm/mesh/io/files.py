@@ -123,7 +123,8 @@ def unpack(archive: Path, folder: Path) -> None:
             with tarfile.open(archive) as t:
                 t.extractall(folder, filter="data")
     except (tarfile.TarError, zipfile.BadZipFile, EOFError, OSError, ValueError) as error:
-        raise DataError(f"{archive}: cannot be unpacked ({error}); wanted a whole .zip or .tar archive") from error
+        why = str(error).partition("\n")[0].removesuffix(":")
+        raise DataError(f"{archive}: cannot be unpacked ({why}); wanted a whole .zip or .tar archive") from error
 
 
 @contextmanager

@@ -13,7 +13,8 @@ from csm.mesh.io.raw import RawMesh, coordinates, decode, polygon_error
 from csm.mesh.shape import Mesh
 
 # The optional prefixes (texture, colour, normal) only add columns after x y z.  ModelNet glues the counts to "OFF".
-_KEYWORD = re.compile(r"(?P<prefix>(?:ST)?C?N?)(?P<dimension>4?n?)OFF", re.IGNORECASE)
+# Case matters: N stands for normals, n for n dimensions.
+_KEYWORD = re.compile(r"(?:(?:ST)?C?N?)(?P<dimension>4?n?)OFF|c?off")
 
 
 def parse_off(data: bytes) -> RawMesh:

@@ -22,8 +22,10 @@ def parse_stl(data: bytes) -> RawMesh:
         If there is no triangle or the file is damaged.
     """
     loaded = load_stl(io.BytesIO(data))
-    if "geometry" in loaded:
-        raise MeshError(f"the file holds {len(loaded['geometry'])} solids, wanted one; save them as one")
+    solids = loaded.get("geometry", {"": loaded})
+    if len(solids) != 1:
+        raise MeshError(f"the file holds {len(solids)} solids, wanted one; is it empty or damaged, or an assembly?")
+    (loaded,) = solids.values()
     vertices, faces = np.asarray(loaded["vertices"]), np.asarray(loaded["faces"])
     if len(faces) == 0 or len(vertices) != 3 * len(faces):
         raise MeshError(f"found {len(vertices)} corners of {len(faces)} triangles: an empty or damaged STL file")

@@ -1,0 +1,146 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from csm.errors import MeshError
+from csm.mesh.io import READABLE, WRITABLE, count_vertices, read_mesh, write_mesh
+from csm.mesh.shape import Mesh
+from tests.shapes import blob, sphere
+
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@st.composite
+def meshes(draw):
+    n = draw(st.integers(1, 12))
+    m = draw(st.integers(1, 12))
+    return Mesh(draw(arrays(float, (n, 3), elements=FINITE)), draw(arrays(int, (m, 3), elements=st.integers(0, n - 1))))
+
+
+@pytest.mark.parametrize("suffix", WRITABLE)
+@settings(max_examples=40, deadline=None)
+@given(mesh=meshes())
+def test_any_mesh_reads_back_with_the_same_bits(tmp_path_factory, suffix, mesh):
+    path = tmp_path_factory.mktemp("round") / f"a{suffix}"
+    write_mesh(path, mesh)
+    back = read_mesh(path)
+    np.testing.assert_array_equal(back.vertices, mesh.vertices)
+    np.testing.assert_array_equal(back.faces, mesh.faces)
+
+
+def test_name_is_the_stem_unless_given(tmp_path):
+    write_mesh(tmp_path / "tr_reg_000.ply", sphere(1))
+    assert read_mesh(tmp_path / "tr_reg_000.ply").name == "tr_reg_000"
+    assert read_mesh(str(tmp_path / "tr_reg_000.ply"), "other").name == "other"
+
+
+def test_npz(tmp_path):
+    mesh = blob(1)
+    np.savez(tmp_path / "a.npz", vertices=mesh.vertices, faces=mesh.faces.astype(np.int32))
+    assert read_mesh(tmp_path / "a.npz").digest == mesh.digest
+
+
+def test_npz_with_other_keys_or_pickles_is_refused(tmp_path):
+    np.savez(tmp_path / "a.npz", verts=np.eye(3), faces=np.eye(3))
+    with pytest.raises(MeshError, match=r"a\.npz: wanted the arrays.*found verts, faces"):
+        read_mesh(tmp_path / "a.npz")
+    np.savez(tmp_path / "b.npz", vertices=np.array([{}], dtype=object), faces=np.eye(3))
+    with pytest.raises(MeshError, match=r"b\.npz: not a readable \.npz"):
+        read_mesh(tmp_path / "b.npz")
+    np.savez(tmp_path / "c.npz", vertices=np.eye(3), faces=np.array([[0.0, 1, 2]]))
+    with pytest.raises(MeshError, match=r"c\.npz.*float64, wanted integers"):
+        read_mesh(tmp_path / "c.npz")
+
+
+def test_a_one_based_file_is_named_as_such(tmp_path):
+    (tmp_path / "a.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 1 2 3\n")
+    with pytest.raises(MeshError, match=r"a\.off: face 0 refers to vertex 3.*1-based"):
+        read_mesh(tmp_path / "a.off")
+
+
+def test_unknown_missing_and_empty_files(tmp_path):
+    (tmp_path / "a.off").write_text("")
+    with pytest.raises(MeshError, match=r"a\.off: the file is empty"):
+        read_mesh(tmp_path / "a.off")
+    with pytest.raises(MeshError, match=r"b\.off: there is no such file"):
+        read_mesh(tmp_path / "b.off")
+    with pytest.raises(MeshError, match=r"does not read \.gltf; wanted \.off, \.ply"):
+        read_mesh(tmp_path / "a.gltf")
+    with pytest.raises(MeshError, match="without a suffix"):
+        read_mesh(tmp_path / "a")
+
+
+@pytest.mark.parametrize("suffix", READABLE)
+@settings(max_examples=60, deadline=None)
+@given(data=st.binary(min_size=1, max_size=300))
+def test_garbage_is_a_mesh_error_that_names_the_file(tmp_path_factory, suffix, data):
+    path = tmp_path_factory.mktemp("garbage") / f"junk{suffix}"
+    path.write_bytes(data)
+    with pytest.raises(MeshError, match="junk"):
+        read_mesh(path)
+
+
+@pytest.mark.parametrize("suffix", [".off", ".ply"])
+@settings(max_examples=60, deadline=None)
+@given(keep=st.floats(0.001, 0.999))
+def test_a_cut_file_never_gives_another_number_of_vertices_or_faces(tmp_path_factory, suffix, keep):
+    mesh = blob(1)
+    path = tmp_path_factory.mktemp("cut") / f"a{suffix}"
+    write_mesh(path, mesh)
+    data = path.read_bytes()
+    path.write_bytes(data[: max(1, int(keep * len(data)))])
+    try:
+        back = read_mesh(path)
+    except MeshError:
+        return
+    # Only possible if the last number of a text file lost digits.
+    assert suffix == ".off"
+    assert (back.n_vertices, back.n_faces) == (mesh.n_vertices, mesh.n_faces)
+
+
+@pytest.mark.parametrize("suffix", [".off", ".ply", ".obj"])
+def test_count_vertices(tmp_path, suffix):
+    write_mesh(tmp_path / f"a{suffix}", sphere(3))
+    assert count_vertices(tmp_path / f"a{suffix}") == 642
+
+
+def test_count_vertices_names_a_damaged_file(tmp_path):
+    (tmp_path / "a.off").write_text("nonsense")
+    with pytest.raises(MeshError, match=r"a\.off"):
+        count_vertices(tmp_path / "a.off")
+
+
+def test_colours_are_checked(tmp_path):
+    mesh = sphere(1)
+    with pytest.raises(MeshError, match="wanted uint8"):
+        write_mesh(tmp_path / "a.ply", mesh, np.zeros((mesh.n_vertices, 3)))
+    with pytest.raises(MeshError, match="wanted uint8"):
+        write_mesh(tmp_path / "a.ply", mesh, np.zeros((3, 3), np.uint8))
+    with pytest.raises(MeshError, match="no vertex colours"):
+        write_mesh(tmp_path / "a.obj", mesh, np.zeros((mesh.n_vertices, 3), np.uint8))
+    with pytest.raises(MeshError, match=r"does not write \.stl"):
+        write_mesh(tmp_path / "a.stl", mesh)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.data
+@pytest.mark.parametrize(
+    ("name", "file", "n_vertices", "n_faces", "area"),
+    [
+        ("FAUST_6890", "shapes/tr_reg_000.mat", 6890, 13776, 1.7718802513328193),
+        ("FAUST_10000", "tr_reg_080.off", 10000, 19996, None),
+        ("FAUST_15000", "tr_reg_080.off", 15000, 29996, None),
+        ("FAUST_5k_remeshed", "vtx_5k/tr_reg_000.off", 4999, 9994, None),
+        ("TOSCA_5k_remeshed", "vtx_5k/cat0.off", 5000, 9996, None),
+        ("SCAPE_5000", "shapes/mesh000.mat", 4999, 9994, 1.0),
+        ("SHREC19_5k_remeshed", "1.obj", 5197, 10390, None),
+    ],
+)
+def test_real_files(data_set, name, file, n_vertices, n_faces, area):
+    mesh = read_mesh(data_set(name) / file)
+    assert (mesh.n_vertices, mesh.n_faces) == (n_vertices, n_faces)
+    assert count_vertices(data_set(name) / file) == n_vertices
+    if area is not None:  # as the file itself states it
+        assert mesh.area == pytest.approx(area, rel=1e-12)

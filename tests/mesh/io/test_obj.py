@@ -1,0 +1,54 @@
+import numpy as np
+import pytest
+
+from csm.errors import MeshError
+from csm.mesh.io.obj import parse_obj
+
+POINTS = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+VERTICES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+TRIANGLES = np.array([[0, 2, 1], [0, 1, 3]])
+
+VARIANTS = {
+    "v": POINTS + "f 1 3 2\nf 1 2 4\n",
+    "v/vt": POINTS + "vt 0 0\nvt 1 1\nf 1/1 3/2 2/1\nf 1/2 2/2 4/1\n",
+    "v//vn": POINTS + "vn 0 0 1\nf 1//1 3//1 2//1\nf 1//1 2//1 4//1\n",
+    "v/vt/vn": POINTS + "vt 0 0\nvt 1 0\nvn 0 0 1\nf 1/1/1 3/1/1 2/2/1\nf 1/2/1 2/1/1 4/1/1\n",
+    "counted back": POINTS + "f -4 -2 -3\nf -4 -3 -1\n",
+    "counted back in between": "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -1 -2\nv 0 0 1\nf -4 -3 -1\n",
+    "comments, groups, materials": "# obj\nmtllib a.mtl\no thing\n"
+    + POINTS
+    + "g part\nusemtl skin\ns 1\nf 1 3 2 # one\n\nl 1 2\np 1\nf 1 2 4\n",
+    "colours and w": POINTS.replace("\n", " 0.1 0.2 0.3\n") + "f 1 3 2\nf 1 2 4\n",
+    "windows": (POINTS + "f 1 3 2\nf 1 2 4\n").replace("\n", "\r\n"),
+    "continued line": POINTS + "f 1 \\\n3 2\nf 1 2 4\n",
+}
+
+
+@pytest.mark.parametrize("text", VARIANTS.values(), ids=VARIANTS.keys())
+def test_every_variant_gives_the_same_mesh(text):
+    raw = parse_obj(text.encode())
+    np.testing.assert_array_equal(raw.vertices, VERTICES)
+    np.testing.assert_array_equal(raw.faces, TRIANGLES)
+
+
+def test_unreferenced_and_repeated_vertices_stay():
+    raw = parse_obj(b"v 5 5 5\n" + POINTS.encode() + POINTS.encode() + b"f 2 3 4\n")
+    assert len(raw.vertices) == 9
+    np.testing.assert_array_equal(raw.faces, [[1, 2, 3]])
+
+
+BROKEN = {
+    "quad": (POINTS + "f 1 2 3\nf 1 2 3 4\n", "face 1 has 4 corners"),
+    "two corners": (POINTS + "f 1 2\n", "face 0 has 2 corners"),
+    "zero": (POINTS + "f 0 1 2\n", "counts vertices from 1"),
+    "too far back": (POINTS + "f -5 -1 -2\n", "only 4 precede"),
+    "words": (POINTS + "f a b c\n", "face 0 is 'f a b c'"),
+    "short vertex": ("v 0 0 0\nv 1 0\n", "vertex 1 is '1 0'"),
+    "no vertices": ("hello\n", "no OBJ mesh"),
+}
+
+
+@pytest.mark.parametrize(("text", "message"), BROKEN.values(), ids=BROKEN.keys())
+def test_broken_files_say_what_is_wrong(text, message):
+    with pytest.raises(MeshError, match=message):
+        parse_obj(text.encode())
