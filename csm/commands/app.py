@@ -14,8 +14,11 @@ from typing import Any
 import hydra
 from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
-from omegaconf import DictConfig
+from hydra.utils import instantiate
+from omegaconf import DictConfig, OmegaConf
 
+from csm.data.datamodule import CorrespondenceDataModule
+from csm.data.store import Store
 from csm.errors import CsmError
 from csm.mesh.io import atomic_path
 
@@ -29,6 +32,9 @@ def config_folder() -> Path:
     package = Path(__file__).resolve().parent.parent
     inside = package / "conf"
     return inside if inside.is_dir() else package.parent / "conf"
+
+
+OmegaConf.register_new_resolver("conf", lambda inner: str(config_folder() / inner), replace=True)
 
 
 def output_folder() -> Path:
@@ -56,7 +62,8 @@ def command(config_name: str) -> Callable[[Run], Callable[[], Any]]:
         def main(cfg: DictConfig) -> Any:
             return _guarded(run, cfg)
 
-        return main
+        entry: Callable[[], Any] = main
+        return entry
 
     return decorate
 
@@ -79,3 +86,11 @@ def _guarded(run: Run, cfg: DictConfig) -> Any:
         return None
     write_json(output_folder() / "result.json", {"status": "ok", **result})
     return result.get("objective")
+
+
+def make_datamodule(cfg: DictConfig) -> CorrespondenceDataModule:
+    """Make the data module of the data group, with the descriptor of its group and the store."""
+    datamodule: CorrespondenceDataModule = instantiate(cfg.data, _partial_=True)(
+        descriptor=instantiate(cfg.descriptor), store=Store(cfg.store), workers=cfg.workers
+    )
+    return datamodule

@@ -2,36 +2,35 @@
 
 from __future__ import annotations
 
-import logging
-import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import torch
-from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig, OmegaConf
 from torch import Tensor
 from tqdm import tqdm
 
 from csm._types import IntArray
 from csm.data.datamodule import CorrespondenceDataModule
-from csm.data.shapeset import ShapeSet
+from csm.data.prepare import Job
+from csm.data.shapeset import Shape, ShapeSet
 from csm.errors import ConfigError
-from csm.evaluation.matching import nearest
-from csm.evaluation.protocol import EvalShape, Evaluation, Protocol, evaluate_matches
+from csm.evaluation.matching import nearest_at
+from csm.evaluation.protocol import Protocol, evaluate_matches
+from csm.evaluation.provenance import provenance
+from csm.evaluation.report import ResultRow, result_row, write_curves_csv, write_rows
+from csm.evaluation.results import Evaluation
 from csm.learning.module import CSMModule
-
-_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
 class Tested:
-    """The evaluation of one test set, with the descriptors and shapes for pictures."""
+    """One test set: its result row, the evaluation behind it, and the shapes and descriptors for pictures."""
 
-    shapes: ShapeSet
+    row: ResultRow
     evaluation: Evaluation
-    items: list[EvalShape]
+    shapes: list[Shape]
     descriptors: dict[str, Tensor]
 
 
@@ -44,17 +43,46 @@ def protocol_of(cfg: DictConfig) -> Protocol:
         raise ConfigError(f"metric: {error}") from error
 
 
-def test_on(module: CSMModule, datamodule: CorrespondenceDataModule, shapes: ShapeSet, protocol: Protocol) -> Tested:
-    """Compute the learned descriptor of every test shape of a set, match by nearest neighbour and measure."""
+def test_on(
+    module: CSMModule, datamodule: CorrespondenceDataModule, shapes: ShapeSet, protocol: Protocol, table: str
+) -> Tested:
+    """Compute the learned descriptor of every test shape of a set, match by nearest neighbour, and measure."""
     names = datamodule.test_names(shapes)
-    items: list[EvalShape] = []
-    descriptors: dict[str, Tensor] = {}
-    for name in tqdm(names, desc=f"describe {shapes.name}", unit="shape"):
-        shape = datamodule.prepared(shapes, name).shape
-        items.append(EvalShape(name, shape.mesh, shape.truth, shape.mirror))
-        descriptors[name] = module.describe(datamodule.sample(shapes, name))
+    datamodule.fill([Job(shapes, name) for name in names])
+    loaded = [datamodule.load(shapes, name) for name in names]
+    descriptors = {
+        item.sample.name: module.describe(item.sample)
+        for item in tqdm(loaded, desc=f"describe {shapes.name}", unit="shape", leave=False)
+    }
 
-    def match(source: EvalShape, target: EvalShape) -> IntArray:
-        return nearest(descriptors[source.name], descriptors[target.name])
+    def match(source: Shape, target: Shape) -> IntArray:
+        return nearest_at(descriptors[source.name], descriptors[target.name], source.truth.known)
 
-    return Tested(shapes, evaluate_matches(items, match, protocol), items, descriptors)
+    evaluation = evaluate_matches([item.shape for item in loaded], match, protocol)
+    training = module.hparams["training"]
+    row = result_row(
+        [evaluation],
+        provenance(),
+        table=table,
+        method=training["name"],
+        train=training["set"],
+        test=shapes.name,
+        seeds=[training["seed"]],
+        epochs=training["epochs"],
+    )
+    return Tested(row, evaluation, [item.shape for item in loaded], descriptors)
+
+
+def keep(tested: Sequence[Tested], folder: Path) -> None:
+    """Write the rows of one job and their CQC curves into its folder."""
+    write_rows(folder / "rows.json", [t.row for t in tested])
+    write_curves_csv(folder / "cqc.csv", {t.row.test: t.evaluation for t in tested})
+
+
+def numbers(tested: Sequence[Tested]) -> dict[str, float]:
+    """Return the errors by test set, flat, for the job's record and for sweep tables."""
+    return {
+        f"{key}/{t.row.test}": float(value)
+        for t in tested
+        for key, value in (("age", t.row.age), ("exact", t.row.exact_match))
+    }

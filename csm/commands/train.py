@@ -3,53 +3,60 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 from typing import Any
 
 import lightning as L
-import torch
 from hydra.utils import instantiate
 from lightning.pytorch.callbacks import ModelCheckpoint, TQDMProgressBar
 from omegaconf import DictConfig, OmegaConf
 
-from csm.commands.app import command, output_folder
-from csm.commands.testing import protocol_of, test_and_record
+from csm.commands.app import command, make_datamodule, output_folder
+from csm.commands.testing import keep, numbers, protocol_of, test_on
 from csm.data.datamodule import CorrespondenceDataModule
-from csm.data.store import Store
 from csm.errors import ConfigError
+from csm.evaluation.report import add_rows
+from csm.evaluation.tables import markdown_table
 from csm.learning.callbacks import ValidationErrors
 from csm.learning.module import CSMModule
 
 
 def run(cfg: DictConfig) -> dict[str, Any]:
-    """Train and, unless ``test=false``, evaluate; return the numbers of the job."""
-    if cfg.trainer.devices not in (1, "auto") or cfg.trainer.get("num_nodes", 1) != 1:
-        raise ConfigError(f"trainer.devices={cfg.trainer.devices}: csm trains on one device, a batch is one shape")
-    L.seed_everything(cfg.seed, workers=True, verbose=False)
-    torch.set_float32_matmul_precision("highest")
+    """Train and, unless ``test=false``, test; return the numbers of the job."""
+    folder = output_folder()
     datamodule = make_datamodule(cfg)
+    module, found = fit(cfg, datamodule, folder)
+    if not cfg.test:
+        return found
+    tested = [
+        test_on(module, datamodule, shapes, protocol_of(cfg.metric), cfg.table)
+        for shapes in datamodule.test_sets.values()
+    ]
+    keep(tested, folder)
+    rows = [t.row for t in tested]
+    if cfg.results:
+        add_rows(cfg.results, rows)
+    print(markdown_table(rows))
+    print(f"rows and curves: {folder}")
+    return found | numbers(tested)
+
+
+def fit(cfg: DictConfig, datamodule: CorrespondenceDataModule, folder: Path) -> tuple[CSMModule, dict[str, Any]]:
+    """Train and save ``model.ckpt`` in `folder`; return the module and what was measured on the way."""
+    if cfg.trainer.devices not in (1, "auto") or cfg.trainer.get("num_nodes", 1) != 1:
+        raise ConfigError(f"trainer.devices={cfg.trainer.devices}: csm trains on one device, as a batch is one shape")
+    L.seed_everything(cfg.seed, workers=True, verbose=False)
     datamodule.prepare_data()
     module = make_module(cfg, datamodule)
+    trainer = make_trainer(cfg, folder)
     begun = time.perf_counter()
-    trainer = make_trainer(cfg)
     trainer.fit(module, datamodule=datamodule, ckpt_path=cfg.resume, weights_only=True)
     seconds = time.perf_counter() - begun
-    checkpoint = output_folder() / "model.ckpt"
+    checkpoint = folder / "model.ckpt"
     trainer.save_checkpoint(checkpoint)
-    print(f"trained for {seconds / 60:.1f} minutes; checkpoint: {checkpoint}")
-    validation = {k: float(v) for k, v in trainer.callback_metrics.items()}
-    numbers: dict[str, Any] = {"seconds": seconds, "checkpoint": str(checkpoint), **validation}
-    if cfg.test:
-        numbers |= test_and_record(cfg, module, datamodule, list(datamodule.test_sets.values()), seconds)
-    return numbers
-
-
-def make_datamodule(cfg: DictConfig) -> CorrespondenceDataModule:
-    """Make the data module of the data group, with its store and descriptor."""
-    store, descriptor = Store(cfg.store), instantiate(cfg.descriptor)
-    datamodule: CorrespondenceDataModule = instantiate(
-        cfg.data, descriptor=descriptor, store=store, workers=cfg.workers
-    )
-    return datamodule
+    print(f"trained for {seconds / 60:.1f} minutes: {checkpoint}")
+    measured = {key: float(value) for key, value in trainer.callback_metrics.items()}
+    return module, {"seconds": seconds, "checkpoint": str(checkpoint), **measured}
 
 
 def make_module(cfg: DictConfig, datamodule: CorrespondenceDataModule) -> CSMModule:
@@ -66,7 +73,6 @@ def make_module(cfg: DictConfig, datamodule: CorrespondenceDataModule) -> CSMMod
         training={
             "name": str(cfg.name),
             "set": datamodule.train_set.name,
-            "split": datamodule.split.label,
             "protocol": datamodule.protocol,
             "seed": int(cfg.seed),
             "epochs": int(cfg.trainer.max_epochs),
@@ -74,16 +80,17 @@ def make_module(cfg: DictConfig, datamodule: CorrespondenceDataModule) -> CSMMod
     )
 
 
-def make_trainer(cfg: DictConfig) -> L.Trainer:
-    """Make the trainer with its callbacks; checkpoints are kept so that a killed run can go on."""
-    folder = output_folder()
+def make_trainer(cfg: DictConfig, folder: Path) -> L.Trainer:
+    """Make the trainer with its callbacks; the last checkpoint is kept so that a killed run can go on."""
     callbacks = [
         ValidationErrors(seed=cfg.seed),
-        ModelCheckpoint(folder / "checkpoints", filename="{epoch:03d}", save_last=True, every_n_epochs=1),
+        ModelCheckpoint(folder / "checkpoints", save_last=True, save_top_k=0, every_n_epochs=1),
         TQDMProgressBar(leave=False),
     ]
-    logger = instantiate(cfg.logger, save_dir=folder) if cfg.logger else False
-    trainer: L.Trainer = instantiate(cfg.trainer, callbacks=callbacks, logger=logger, default_root_dir=folder)
+    logger = instantiate(cfg.logger, _partial_=True)(save_dir=folder) if cfg.logger else False
+    trainer: L.Trainer = instantiate(cfg.trainer, _partial_=True)(
+        callbacks=callbacks, logger=logger, default_root_dir=folder
+    )
     return trainer
 
 

@@ -35,6 +35,13 @@ class ShapeSample(NamedTuple):
     classes: Tensor
 
 
+class Loaded(NamedTuple):
+    """A shape and its tensors."""
+
+    shape: Shape
+    sample: ShapeSample
+
+
 def to_sample(prepared: Prepared) -> ShapeSample:
     """Convert a prepared shape to float32 tensors."""
     truth = prepared.shape.truth.indices
@@ -96,7 +103,7 @@ class CorrespondenceDataModule(L.LightningDataModule):
         self.holdout = holdout
         self.fit_names, held_out = self.split.held_out(holdout)
         self.validation_names = held_out or self.split.train[-10:]
-        self._prepared: dict[tuple[str, str], Prepared] = {}
+        self._loaded: dict[tuple[str, str], Loaded] = {}
 
     @property
     def protocol(self) -> str:
@@ -110,48 +117,52 @@ class CorrespondenceDataModule(L.LightningDataModule):
 
     def prepare_data(self) -> None:
         """Fill the store for the training shapes; Lightning calls this on one process only."""
-        self.fill([Job(self.train_set, name) for name in self._require("train", self.train_set)])
+        self.fill([Job(self.train_set, name) for name in self.train_names()])
 
     def fill(self, jobs: Sequence[Job]) -> None:
         """Prepare shapes; raise a DataError with the table of failures if there are any."""
-        missing = [job for job in jobs if (job.shapes.name, job.name) not in self._prepared]
-        summary = prepare(missing, self.recipe, self.store, workers=self.workers)
+        summary = prepare(jobs, self.recipe, self.store, workers=self.workers)
         if summary.failures:
             raise DataError(f"{len(summary.failures)} of {len(jobs)} shapes cannot be used:\n{summary.table()}")
 
-    def test_jobs(self) -> list[Job]:
-        """Return every test shape of every test set."""
-        return [Job(s, name) for s in self.test_sets.values() for name in self._require("test", s)]
+    def train_names(self) -> tuple[str, ...]:
+        """Return the names of the split's training shapes; DataError if the set lacks one."""
+        return self._require("train", self.train_set)
+
+    def test_names(self, shapes: ShapeSet) -> tuple[str, ...]:
+        """Return the names of the split's test shapes; DataError if the set lacks one."""
+        return self._require("test", shapes)
 
     def _require(self, part: str, shapes: ShapeSet) -> tuple[str, ...]:
         self.split.require(shapes.names, shapes.name, part)
         names: tuple[str, ...] = getattr(self.split, part)
         return names
 
-    def prepared(self, shapes: ShapeSet, name: str) -> Prepared:
-        """Return one shape with features and basis; it stays in memory."""
+    def load(self, shapes: ShapeSet, name: str) -> Loaded:
+        """Return one shape with its tensors; it stays in memory."""
         key = (shapes.name, name)
-        if key not in self._prepared:
-            self._prepared[key] = prepare_shape(shapes.load(name), self.recipe, self.store)
-        return self._prepared[key]
-
-    def sample(self, shapes: ShapeSet, name: str) -> ShapeSample:
-        """Return one shape as tensors."""
-        return to_sample(self.prepared(shapes, name))
+        if key not in self._loaded:
+            shape = shapes.load(name)
+            self._loaded[key] = Loaded(shape, to_sample(prepare_shape(shape, self.recipe, self.store)))
+        return self._loaded[key]
 
     @property
     def n_features(self) -> int:
         """Width P of the input features."""
-        return int(self.prepared(self.train_set, self.fit_names[0]).features.shape[1])
+        return self._first.sample.features.shape[1]
 
     @property
     def n_classes(self) -> int:
         """Number of template points."""
-        return len(self.prepared(self.train_set, self.fit_names[0]).shape.truth.indices)
+        return self._first.shape.truth.n_from
+
+    @property
+    def _first(self) -> Loaded:
+        return self.load(self.train_set, self.fit_names[0])
 
     def validation_shapes(self) -> list[Shape]:
         """Return the meshes and truths of the validation shapes."""
-        return [self.prepared(self.train_set, name).shape for name in self.validation_names]
+        return [self.load(self.train_set, name).shape for name in self.validation_names]
 
     def train_dataloader(self) -> DataLoader[ShapeSample]:
         """Return the fitted shapes in random order."""
@@ -162,5 +173,5 @@ class CorrespondenceDataModule(L.LightningDataModule):
         return self._loader(self.validation_names, shuffle=False)
 
     def _loader(self, names: Sequence[str], shuffle: bool) -> DataLoader[ShapeSample]:
-        samples = [self.sample(self.train_set, name) for name in names]
+        samples = [self.load(self.train_set, name).sample for name in names]
         return DataLoader(samples, batch_size=None, shuffle=shuffle)  # type: ignore[arg-type]

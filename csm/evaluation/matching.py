@@ -94,6 +94,19 @@ def nearest(queries: Rows, candidates: Rows, *, block: int = 2048) -> IntArray:
     return found.cpu().numpy()
 
 
+def nearest_at(queries: Rows, candidates: Rows, at: IntArray, *, block: int = 2048) -> IntArray:
+    """Find the nearest candidate of the queries numbered `at` only; the others get -1.
+
+    An evaluation needs the vertices with known ground truth, which on a fine mesh may be few.  Shapes and errors are
+    those of `nearest`.
+    """
+    found = np.full(len(queries), -1, dtype=np.int64)
+    found[at] = nearest(
+        queries[torch.as_tensor(at) if isinstance(queries, torch.Tensor) else at], candidates, block=block
+    )
+    return found
+
+
 def _tensor(rows: Rows) -> torch.Tensor:
     tensor = torch.as_tensor(rows).detach()
     return tensor if tensor.dtype in (torch.float32, torch.float64) else tensor.float()

@@ -17,11 +17,11 @@ from tqdm import tqdm
 
 from csm._types import IntArray
 from csm.errors import ConfigError, DataError
+from csm.data.shapeset import Shape
 from csm.evaluation.distances import MatchedPoints, TargetErrors, target_errors
 from csm.evaluation.metrics import FLIP_MARGIN
 from csm.evaluation.results import Evaluation, PairErrors, summarise
-from csm.mesh.correspondence import PointMap, ground_truth
-from csm.mesh.shape import Mesh
+from csm.mesh.correspondence import ground_truth
 from csm.operators.geodesic import Method
 
 Normaliser: TypeAlias = Literal["diameter", "sqrt_area"]
@@ -115,33 +115,11 @@ class Protocol:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class EvalShape:
-    """A shape to be matched, with its ground truth.
-
-    Parameters
-    ----------
-    name
-        Unique in an evaluation.
-    mesh
-        N vertices.
-    truth
-        Where the template points lie on the mesh.
-    mirror
-        Where they lie on it after exchanging left and right, if that is known.
-    """
-
-    name: str
-    mesh: Mesh
-    truth: PointMap
-    mirror: PointMap | None = None
-
-
-Matcher: TypeAlias = Callable[[EvalShape, EvalShape], IntArray]
+Matcher: TypeAlias = Callable[[Shape, Shape], IntArray]
 
 
 def evaluate_matches(
-    shapes: Sequence[EvalShape], match: Matcher, protocol: Protocol, progress: bool = True, *, workers: int = 1
+    shapes: Sequence[Shape], match: Matcher, protocol: Protocol, progress: bool = True, *, workers: int = 1
 ) -> Evaluation:
     """Match every pair of the protocol and measure the errors.
 
@@ -151,7 +129,7 @@ def evaluate_matches(
         With unique names.
     match
         Called as ``match(source, target)``, target by target; gives for each vertex of the source a vertex of the
-        target, shape (N_source,).
+        target, shape (N_source,). Only vertices with known ground truth are looked at; others may be -1.
     protocol
         Which pairs, distance and normaliser.
     progress
@@ -194,11 +172,12 @@ def _by_target(pairs: Sequence[Pair]) -> dict[str, list[str]]:
     return sources
 
 
-def _matched_points(source: EvalShape, target: EvalShape, match: Matcher) -> MatchedPoints:
+def _matched_points(source: Shape, target: Shape, match: Matcher) -> MatchedPoints:
     points = ground_truth(source.truth, target.truth)
     matched = np.asarray(match(source, target))
     n, m = source.mesh.n_vertices, target.mesh.n_vertices
-    if matched.shape != (n,) or matched.dtype.kind not in "iu" or matched.min() < 0 or matched.max() >= m:
+    asked = matched[points.source] if matched.shape == (n,) else np.array([-1])
+    if matched.dtype.kind not in "iu" or asked.min(initial=0) < 0 or asked.max(initial=0) >= m:
         raise DataError(
             f"{source.name} -> {target.name}: the match is {matched.dtype} of shape {matched.shape}; wanted {n} "
             f"integers in 0..{m - 1}"
@@ -208,7 +187,7 @@ def _matched_points(source: EvalShape, target: EvalShape, match: Matcher) -> Mat
         s, t = source.truth.as_template_to_shape(), target.truth.as_template_to_shape()
         both = (s.indices >= 0) & (t.indices >= 0)
         mirror = target.mirror.as_template_to_shape(t.n_from).indices[both]
-    return MatchedPoints(points.target, matched[points.source].astype(np.int64), mirror)
+    return MatchedPoints(points.target, asked.astype(np.int64), mirror)
 
 
 def _advance(bar: tqdm[Any], n_pairs: int, _: Future[TargetErrors]) -> None:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import lightning as L
 import numpy as np
-import torch
 from torch import Tensor
 
+from csm._types import IntArray
 from csm.data.datamodule import CorrespondenceDataModule
 from csm.data.shapeset import Shape
-from csm.evaluation.matching import nearest
-from csm.evaluation.protocol import EvalShape, Evaluation, Protocol, evaluate_matches
+from csm.evaluation.matching import nearest_at
+from csm.evaluation.protocol import Protocol, evaluate_matches
+from csm.evaluation.results import Evaluation
 
 
 class ValidationErrors(L.Callback):
@@ -51,24 +53,20 @@ class ValidationErrors(L.Callback):
         datamodule = trainer.datamodule  # type: ignore[attr-defined]
         if trainer.sanity_checking or not isinstance(datamodule, CorrespondenceDataModule):
             return
-        shapes = [self._thinned(shape) for shape in datamodule.validation_shapes()]
         found, self._descriptors = self._descriptors, {}
+        shapes = [self._thinned(shape) for shape in datamodule.validation_shapes() if shape.name in found]
 
-        def match(source: EvalShape, target: EvalShape) -> np.ndarray:
-            chosen = source.truth.indices[source.truth.indices >= 0]
-            indices = np.full(source.mesh.n_vertices, -1)
-            indices[chosen] = nearest(found[source.name][torch.as_tensor(chosen)], found[target.name])
-            return indices
+        def match(source: Shape, target: Shape) -> IntArray:
+            return nearest_at(found[source.name], found[target.name], source.truth.known)
 
         self.latest = evaluate_matches(shapes, match, self.protocol, progress=False)
         pl_module.log("val/age", self.latest.summary["age"], prog_bar=True)
         pl_module.log("val/exact", self.latest.summary["exact"], prog_bar=True)
 
-    def _thinned(self, shape: Shape) -> EvalShape:
+    def _thinned(self, shape: Shape) -> Shape:
         """Return the shape with only the sampled template points known."""
-        indices = shape.truth.indices
-        keep = np.random.default_rng(self.seed).permutation(len(indices))[: self.points]
-        thin = np.full_like(indices, -1)
-        thin[keep] = indices[keep]
-        truth = type(shape.truth)(thin, shape.truth.direction, shape.truth.n_to, shape.truth.name)
-        return EvalShape(shape.name, shape.mesh, truth)
+        truth = shape.truth
+        drop = np.random.default_rng(self.seed).permutation(truth.n_from)[self.points :]
+        indices = truth.indices.copy()
+        indices[drop] = -1
+        return replace(shape, truth=replace(truth, indices=indices), mirror=None)

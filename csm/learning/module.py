@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from pickle import UnpicklingError
 from typing import Any, Literal, cast
 
 import lightning as L
@@ -11,7 +13,7 @@ from torch.optim import Adam
 from torch.optim.lr_scheduler import CosineAnnealingLR, LRScheduler, OneCycleLR, StepLR
 
 from csm.data.datamodule import ShapeSample
-from csm.errors import ConfigError
+from csm.errors import ConfigError, DataError
 from csm.learning.loss import Products, linear_cross_entropy
 from csm.networks import Basis, CorrespondenceNetwork, build
 
@@ -131,3 +133,19 @@ class CSMModule(L.LightningModule):
             case "one_cycle":
                 return OneCycleLR(optimizer, self.lr, total_steps=steps)
         raise ConfigError(f"schedule is constant, cosine, step or one_cycle, got {self.schedule!r}")
+
+
+def load_module(path: Path) -> CSMModule:
+    """Load a checkpoint that `csm train` wrote; no config is needed and nothing in the file is executed.
+
+    Raises
+    ------
+    DataError
+        If there is no such file, or it is no checkpoint of csm.
+    """
+    if not path.is_file():
+        raise DataError(f"{path}: there is no such checkpoint; csm train writes model.ckpt into its output folder")
+    try:
+        return CSMModule.load_from_checkpoint(path, map_location="cpu", weights_only=True)
+    except (UnpicklingError, RuntimeError, KeyError, TypeError, EOFError) as error:
+        raise DataError(f"{path}: not a checkpoint of csm ({str(error).splitlines()[0]})") from error

@@ -90,6 +90,11 @@ class PointMap:
         return len(self.indices)
 
     @property
+    def known(self) -> IntArray:
+        """The counterparts that there are, without -1, in the order of the "from" side."""
+        return self.indices[self.indices >= 0]
+
+    @property
     def n_known(self) -> int:
         """Number of points that have a counterpart."""
         return int((self.indices >= 0).sum())

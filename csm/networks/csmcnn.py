@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import Literal
 
@@ -86,7 +87,7 @@ class CSMCNN(nn.Module):
 
         self.ks = ks
         self.lift = nn.Linear(in_channels, channels[0])
-        self.convs = nn.ModuleList(CSMConv(a, b, terms, bias) for a, b in zip(channels[:-1], channels[1:], strict=True))
+        self.convs = nn.ModuleList(CSMConv(a, b, terms, bias) for a, b in itertools.pairwise(channels))
         self.embed = nn.Linear(channels[-1], descriptor_channels)
         self.finish = nn.ModuleList(finish(width) for width in (*channels, descriptor_channels))
         self.dropout = nn.Dropout(dropout)

@@ -1,0 +1,55 @@
+"""``csm evaluate checkpoint=...``: test a trained network on the test sets of any data module."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from hydra.utils import instantiate
+from omegaconf import DictConfig
+
+from csm.commands.app import command, output_folder
+from csm.commands.testing import keep, numbers, protocol_of, test_on
+from csm.data.datamodule import CorrespondenceDataModule
+from csm.data.store import Store
+from csm.descriptors import from_parameters
+from csm.errors import ConfigError
+from csm.evaluation.report import add_rows
+from csm.evaluation.tables import markdown_table
+from csm.learning.module import CSMModule, load_module
+
+
+def run(cfg: DictConfig) -> dict[str, Any]:
+    """Test the checkpoint; descriptor and basis are those it was trained with."""
+    if cfg.checkpoint is None:
+        raise ConfigError("evaluate needs checkpoint=PATH, a .ckpt that csm train wrote")
+    module = load_module(Path(cfg.checkpoint))
+    datamodule = datamodule_of(cfg, module)
+    tested = [
+        test_on(module, datamodule, shapes, protocol_of(cfg.metric), cfg.table)
+        for shapes in datamodule.test_sets.values()
+    ]
+    keep(tested, output_folder())
+    rows = [t.row for t in tested]
+    if cfg.results:
+        add_rows(cfg.results, rows)
+    print(markdown_table(rows))
+    print(f"rows and curves: {output_folder()}")
+    return numbers(tested)
+
+
+def datamodule_of(cfg: DictConfig, module: CSMModule) -> CorrespondenceDataModule:
+    """Make the data module of the data group with the descriptor and basis of a trained module."""
+    datamodule: CorrespondenceDataModule = instantiate(cfg.data, _partial_=True)(
+        descriptor=from_parameters(**module.hparams["descriptor"]),
+        basis_k=module.hparams["basis_k"],
+        store=Store(cfg.store),
+        workers=cfg.workers,
+    )
+    return datamodule
+
+
+main = command("evaluate")(run)
+
+if __name__ == "__main__":
+    main()

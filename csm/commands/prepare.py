@@ -1,0 +1,87 @@
+"""``csm prepare``: fill the store for all shapes of a data module, check it, or prune it."""
+
+from __future__ import annotations
+
+import shutil
+from typing import Any
+
+from omegaconf import DictConfig
+
+from csm.commands.app import command, make_datamodule
+from csm.data.datamodule import CorrespondenceDataModule
+from csm.data.prepare import Job, Summary, prepare
+from csm.data.store import Store
+from csm.errors import ConfigError, DataError
+
+
+def run(cfg: DictConfig) -> dict[str, Any]:
+    """Do what ``action`` says; return counts."""
+    if cfg.action == "check":
+        return check_store(Store(cfg.store))
+    if cfg.action == "prune":
+        return prune_store(Store(cfg.store), cfg.unused_days)
+    if cfg.action != "fill":
+        raise ConfigError(f"action={cfg.action}: wanted fill, check or prune")
+    datamodule = make_datamodule(cfg)
+    summary = fill_store(datamodule, all_jobs(datamodule), cfg.workers)
+    if summary.failures:
+        raise DataError(
+            f"{len(summary.failures)} shapes cannot be prepared; the others are in the store.\n{summary.table()}"
+        )
+    return {"present": summary.present, "made": summary.made, "seconds": summary.seconds}
+
+
+def all_jobs(datamodule: CorrespondenceDataModule) -> list[Job]:
+    """Return every training and test shape of a data module, each once."""
+    train = [Job(datamodule.train_set, name) for name in datamodule.train_names()]
+    test = [Job(shapes, name) for shapes in datamodule.test_sets.values() for name in datamodule.test_names(shapes)]
+    return list({job.label: job for job in [*train, *test]}.values())
+
+
+def fill_store(datamodule: CorrespondenceDataModule, jobs: list[Job], workers: int | None) -> Summary:
+    """Prepare the shapes and print an account."""
+    root = datamodule.store.root
+    print(f"preparing {len(jobs)} shapes into {root} ({_gigabytes(_existing(root))} GB free there)")
+    summary = prepare(jobs, datamodule.recipe, datamodule.store, workers=workers)
+    print(
+        f"{summary.made} made, {summary.present} already there, {len(summary.failures)} failed, "
+        f"in {summary.seconds / 60:.1f} minutes"
+    )
+    return summary
+
+
+def check_store(store: Store) -> dict[str, Any]:
+    """Read the whole store and print what is in it; DataError if a file is faulty."""
+    sound, faults = store.check()
+    for kind in sorted({entry.kind for entry in sound}):
+        entries = [entry for entry in sound if entry.kind == kind]
+        print(f"{kind:<12} {len(entries):>6} entries  {sum(e.bytes for e in entries) / 1e6:>10.1f} MB")
+    if faults:
+        raise DataError(
+            f"{len(faults)} faulty files in {store.root} (csm prepare action=prune deletes them):\n" + "\n".join(faults)
+        )
+    print(f"{store.root}: {len(sound)} entries, all sound")
+    return {"entries": len(sound), "bytes": sum(entry.bytes for entry in sound)}
+
+
+def prune_store(store: Store, unused_days: float | None) -> dict[str, Any]:
+    """Delete faulty and, if asked, long unused entries, and print them."""
+    gone = store.prune(unused_days=unused_days)
+    for path in gone:
+        print(f"deleted {path}")
+    print(f"{store.root}: {len(gone)} files deleted")
+    return {"deleted": len(gone)}
+
+
+def _existing(folder: Any) -> Any:
+    return next(path for path in (folder, *folder.parents) if path.exists())
+
+
+def _gigabytes(folder: Any) -> int:
+    return int(shutil.disk_usage(folder).free // 10**9)
+
+
+main = command("prepare")(run)
+
+if __name__ == "__main__":
+    main()
