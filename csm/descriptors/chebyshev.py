@@ -46,9 +46,9 @@ class ACD:
 
     Notes
     -----
-    The defaults are the text of the paper (140 columns); `release` is the published code (48 columns).  The shape's
-    orientation matters: a mesh turned inside out gets the descriptor of its mirror image, whose block j is block
-    -j mod J of the original.
+    The defaults are the text of the paper (140 columns); `release` is the published code (48 columns).  Block j of a
+    mirror image is block -j mod J of the original.  Faces must be oriented outwards: inside out, convex and concave
+    change places as well, and the block of theta is the original's of pi/2 - theta.
 
     Examples
     --------

@@ -158,7 +158,9 @@ def test_line_average_is_the_leading_eigenvector_of_the_corner_lines():
             line = vectors[:, tangent][:, values[tangent].argmin()]
             total += np.outer(line, line)
         values, vectors = np.linalg.eigh(total)
-        np.testing.assert_allclose(np.outer(frames.v[f], frames.v[f]), np.outer(vectors[:, 2], vectors[:, 2]), atol=1e-8)
+        np.testing.assert_allclose(
+            np.outer(frames.v[f], frames.v[f]), np.outer(vectors[:, 2], vectors[:, 2]), atol=1e-8
+        )
         assert frames.coherence[f] == pytest.approx((values[2] - values[1]) / 3, abs=1e-8)
 
 

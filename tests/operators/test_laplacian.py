@@ -48,7 +48,7 @@ def test_right_angle_exchanges_the_axes():
 
 
 def test_against_the_formula_face_by_face():
-    """Baselines 1.2 and 1.3 as written: turn the frame about the inward normal by -theta, then sum over corner pairs."""
+    """As published: turn the frame about the inward normal by -theta, then sum over corner pairs."""
     mesh, alpha, theta = blob(1), 7.0, 0.6
     frames = face_frames(mesh)
     expected = np.zeros((mesh.n_vertices, mesh.n_vertices))

@@ -1,0 +1,27 @@
+from __future__ import annotations
+
+import pytest
+
+from csm.descriptors import ACD, PRESETS, preset
+from csm.errors import ConfigError
+
+
+def test_paper_and_release_are_the_settings_of_the_table():
+    assert preset("acd_paper") == ACD(alpha=10, angles=20, k=10, order=6, normalise=False, frame="line_field", sweeps=3)
+    assert preset("acd_release") == ACD(4, 8, 70, 5, True, "line_field", 3)
+    assert preset("acd_release_frame") == ACD(4, 8, 70, 5, True, "released", 10)
+
+
+@pytest.mark.parametrize("name", list(PRESETS))
+def test_every_preset_lets_every_parameter_be_replaced(name):
+    changed = preset(name, k=33)
+    assert changed.parameters() == preset(name).parameters() | {"k": 33}
+
+
+def test_unknown_names_parameters_and_values_are_refused():
+    with pytest.raises(ConfigError, match="acd_paper"):
+        preset("acd")
+    with pytest.raises(ConfigError, match=r"no parameter q; it has alpha"):
+        preset("acd_paper", q=1)
+    with pytest.raises(ConfigError, match="wanted"):
+        preset("acd_paper", k=0)

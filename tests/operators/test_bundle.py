@@ -1,0 +1,91 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from csm.errors import MeshError
+from csm.mesh.shape import Mesh
+from csm.operators import Operators
+from csm.operators import bundle as module
+from tests.shapes import blob, sphere
+
+
+class Shelf:
+    """A memo that keeps arrays under a key made of plain data, as a file would."""
+
+    def __init__(self):
+        self.kept, self.made = {}, []
+
+    def fetch(self, kind, mesh, params, make):
+        key = (kind, mesh.digest, json.dumps(params, sort_keys=True))
+        if key not in self.kept:
+            self.made.append(kind)
+            self.kept[key] = {name: array.copy() for name, array in make().items()}
+        return self.kept[key]
+
+
+def test_area_is_one_and_the_way_back_is_kept():
+    big = replace(blob(2), vertices=7.0 * blob(2).vertices)
+    operators = Operators(big)
+    assert operators.mesh.area == pytest.approx(1)
+    np.testing.assert_allclose(operators.mesh.vertices * operators.mesh.scale, big.vertices)
+    assert operators.mass.sum() == pytest.approx(1)
+    assert Operators(big, unit_area=False).mesh is big
+
+
+def test_scale_plays_no_part_at_unit_area():
+    mesh = blob(3)
+    big = Operators(replace(mesh, vertices=3.0 * mesh.vertices))
+    np.testing.assert_allclose(big.lbo(10).evals, Operators(mesh).lbo(10).evals, atol=1e-8)
+    np.testing.assert_allclose(big.albo(10, 1, 10).evals, Operators(mesh).albo(10, 1, 10).evals, atol=1e-8)
+
+
+def test_nothing_is_computed_before_or_twice(monkeypatch):
+    calls = []
+    for name in ("face_frames", "eigenpairs"):
+        honest = getattr(module, name)
+        monkeypatch.setattr(module, name, lambda *a, n=name, f=honest, **k: calls.append(n) or f(*a, **k))
+    operators = Operators(blob(2))
+    assert calls == []
+    assert operators.lbo(5) is operators.lbo(5)
+    assert calls == ["eigenpairs"]
+    operators.albo(10, 0.0, 5), operators.albo(10, 0.5, 5), operators.albo(10, 0.5, 5)
+    assert calls == ["eigenpairs", "face_frames", "eigenpairs", "eigenpairs"]
+
+
+def test_a_memo_is_asked_with_plain_data_and_its_answer_is_the_same():
+    mesh, shelf = blob(2), Shelf()
+    first, second = Operators(mesh, memo=shelf), Operators(mesh, memo=shelf)
+    for solve in (lambda o: o.lbo(6), lambda o: o.albo(np.float64(10), np.float64(0.5), np.int64(6))):
+        made, kept = solve(first), solve(second)
+        for field in ("evals", "evecs", "mass"):
+            np.testing.assert_array_equal(getattr(made, field), getattr(kept, field))
+        assert (made.residual, made.notes) == (kept.residual, kept.notes)
+    assert shelf.made == ["lbo", "albo"]
+
+
+def test_every_parameter_is_part_of_the_memo_key():
+    shelf = Shelf()
+    operators = Operators(blob(2), memo=shelf)
+    asked = [{}, {"alpha": 4.0}, {"theta": 0.2}, {"k": 5}, {"frame": "released"}, {"sweeps": 1}]
+    for change in asked:
+        operators.albo(**({"alpha": 10.0, "theta": 0.1, "k": 6} | change))
+    assert shelf.made == ["albo"] * len(asked)
+
+
+def test_floored_faces_are_recorded_also_through_a_memo():
+    square = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [1, 1, 0.0]])
+    mesh, shelf = Mesh(square, np.array([[0, 1, 2], [0, 2, 4], [0, 4, 3], [4, 2, 3]]), "flap"), Shelf()
+    for _ in range(2):
+        (note,) = Operators(mesh, memo=shelf).lbo(2).notes
+        assert "1 faces" in note
+        assert "face 1" in note
+
+
+def test_a_mesh_that_cannot_carry_a_laplacian_is_refused():
+    broken = Mesh(np.vstack([sphere(1).vertices, [[9, 9, 9.0]]]), sphere(1).faces, "broken")
+    with pytest.raises(MeshError, match="broken"):
+        Operators(broken)
