@@ -15,6 +15,7 @@ from csm.commands.app import command, make_datamodule, output_folder
 from csm.commands.testing import keep, numbers, protocol_of, test_on
 from csm.data.datamodule import CorrespondenceDataModule
 from csm.errors import ConfigError
+from csm.evaluation.provenance import provenance
 from csm.evaluation.report import add_rows
 from csm.evaluation.tables import markdown_table
 from csm.learning.callbacks import ValidationErrors
@@ -61,7 +62,7 @@ def fit(cfg: DictConfig, datamodule: CorrespondenceDataModule, folder: Path) -> 
 
 def make_module(cfg: DictConfig, datamodule: CorrespondenceDataModule) -> CSMModule:
     """Make the module of the model and optimizer groups for the shapes of a data module."""
-    descriptor = datamodule.recipe.descriptor
+    descriptor, made = datamodule.recipe.descriptor, provenance()
     network: dict[str, Any] = OmegaConf.to_container(cfg.model, resolve=True)  # type: ignore[assignment]
     return CSMModule(
         network=network,
@@ -76,6 +77,8 @@ def make_module(cfg: DictConfig, datamodule: CorrespondenceDataModule) -> CSMMod
             "protocol": datamodule.protocol,
             "seed": int(cfg.seed),
             "epochs": int(cfg.trainer.max_epochs),
+            "command": made.command,
+            "commit": made.commit,
         },
     )
 

@@ -32,7 +32,7 @@ _DISTANCES = {
     "edge": "shortest path along edges",
 }
 _NORMALISERS = {
-    "diameter": "geodesic diameter of the target (the same distance, double sweep, a lower bound)",
+    "diameter": "geodesic diameter of the target (of the same distance; a lower bound by sweeps)",
     "sqrt_area": "square root of the area of the target",
 }
 

@@ -81,7 +81,7 @@ class Evaluation:
         Shape (T,) each: the pooled curve.
     summary
         Pooled figures: ``age`` (over points), ``age_over_pairs`` (mean of the rows), ``age_diameter`` and
-        ``age_sqrt_area`` (the pooled age in both normalisers), ``exact_match``, ``p95``, ``auc``, ``flip_rate`` (NaN if
+        ``age_sqrt_area`` (the pooled age in both normalisers), ``exact``, ``p95``, ``auc``, ``flip_rate`` (NaN if
         unknown), ``coverage`` (mean of the rows), ``pairs``, ``points``, ``unreachable``.
     seconds
         Wall time of matching and measuring.
@@ -143,7 +143,7 @@ def _summary(
         "age_over_pairs": float(np.mean([row.age for row in rows])),
         "age_diameter": pooled([t / row.diameter for t, row in zip(totals, rows, strict=True)]),
         "age_sqrt_area": pooled([t / row.sqrt_area for t, row in zip(totals, rows, strict=True)]),
-        "exact_match": pooled([row.exact for row in rows]),
+        "exact": pooled([row.exact for row in rows]),
         "p95": metrics.percentile95(errors),
         "auc": metrics.auc(metrics.THRESHOLDS, curve),
         "flip_rate": float(np.concatenate(flips).mean()) if flips else float("nan"),

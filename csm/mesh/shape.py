@@ -44,7 +44,9 @@ class Mesh:
         if vertices.ndim != 2 or vertices.shape[1] != 3:
             raise MeshError(f"{self.name}: vertices have shape {vertices.shape}, wanted (N, 3)")
         if faces.ndim != 2 or faces.shape[1] != 3:
-            raise MeshError(f"{self.name}: faces have shape {faces.shape}, wanted (M, 3): csm reads triangle meshes only")
+            raise MeshError(
+                f"{self.name}: faces have shape {faces.shape}, wanted (M, 3): csm reads triangle meshes only"
+            )
         _require_indices_in_range(faces, len(vertices), self.name)
         for key, array in (("vertices", vertices), ("faces", faces)):
             array.setflags(write=False)
