@@ -16,8 +16,8 @@ import numpy as np
 from tqdm import tqdm
 
 from csm._types import IntArray
-from csm.errors import ConfigError, DataError
 from csm.data.shapeset import Shape
+from csm.errors import ConfigError, DataError
 from csm.evaluation.distances import MatchedPoints, TargetErrors, target_errors
 from csm.evaluation.metrics import FLIP_MARGIN
 from csm.evaluation.results import Evaluation, PairErrors, summarise
