@@ -9,7 +9,9 @@ from typing import Any
 from csm.data.datamodule import CorrespondenceDataModule
 from csm.data.folder import find_sets, recognise
 from csm.data.folderset import FolderSet
+from csm.data.humansset import HumansSet
 from csm.data.splits import Split
+from csm.data.store import Store
 from csm.errors import DataError
 
 
@@ -30,6 +32,25 @@ def find_set(root: str | Path, *names: str) -> FolderSet:
         f"{Path(root).resolve()}: wanted {' or '.join(names)}, but {there}; set data.root (or CSM_DATA) to the folder "
         "that holds it, `csm check FOLDER` tells what is in a folder and where a set is published"
     )
+
+
+class HumansDataModule(CorrespondenceDataModule):
+    """The built-in humans, which need no download; tests at other resolutions are made from them.
+
+    Parameters
+    ----------
+    train
+        Set to train on: "original", "refined_N" or "remeshed_N" for N vertices.
+    test
+        Sets to test on.
+    options
+        Of `CorrespondenceDataModule`.
+    """
+
+    def __init__(self, train: str = "original", test: Sequence[str] = ("original",), **options: Any) -> None:
+        store: Store | None = options.get("store")
+        root = None if store is None else str(store.root)
+        super().__init__(HumansSet.parse(train, root), [HumansSet.parse(text, root) for text in test], **options)
 
 
 class FaustDataModule(CorrespondenceDataModule):
@@ -59,7 +80,15 @@ class FaustDataModule(CorrespondenceDataModule):
 
 
 class ScapeDataModule(CorrespondenceDataModule):
-    """SCAPE, remeshed to about 5000 vertices; the 5000 classes reach a shape's vertices through its label file."""
+    """SCAPE, remeshed to about 5000 vertices; the 5000 classes reach a shape's vertices through its label file.
+
+    Parameters
+    ----------
+    root
+        Folder with SCAPE_5000.
+    options
+        Of `CorrespondenceDataModule`.
+    """
 
     def __init__(self, root: str | Path, **options: Any) -> None:
         scape = find_set(root, "SCAPE_5000")
@@ -77,6 +106,8 @@ class ToscaDataModule(CorrespondenceDataModule):
         "cat", "centaur", "david", "dog", "gorilla", "horse", "michael", "victoria" or "wolf".
     n_train
         The first so many shapes of the class train, the others test.
+    options
+        Of `CorrespondenceDataModule`.
     """
 
     def __init__(self, root: str | Path, category: str = "cat", n_train: int = 8, **options: Any) -> None:
@@ -93,17 +124,19 @@ class ToscaDataModule(CorrespondenceDataModule):
 
 
 class Shrec19DataModule(CorrespondenceDataModule):
-    """SHREC'19 humans over the FAUST template: the mapped shapes, all of them for tests unless a split says otherwise.
-
-    A network trained on FAUST can be tested here; `data.train_set` exists so that one can also train on it.
+    """The mapped shapes of SHREC'19 over the FAUST template, so that a network trained on FAUST can be tested on them.
 
     Parameters
     ----------
+    root
+        Folder with SHREC19_5k_remeshed.
     n_train
-        The first so many mapped shapes train, the others test; 0, the default, leaves all of them for tests.
+        The first so many mapped shapes train, the others test.
+    options
+        Of `CorrespondenceDataModule`.
     """
 
-    def __init__(self, root: str | Path, n_train: int = 1, **options: Any) -> None:
+    def __init__(self, root: str | Path, n_train: int = 10, **options: Any) -> None:
         shrec = find_set(root, "SHREC19_5k_remeshed")
         options.setdefault("split", Split("shrec19", shrec.mapped[:n_train], shrec.mapped[n_train:]))
         super().__init__(shrec, [shrec], **options)
@@ -122,6 +155,8 @@ class FolderDataModule(CorrespondenceDataModule):
         A split file. Without one, the last `n_test` shapes of the training folder are the test shapes.
     n_test
         See `split`.
+    options
+        Of `CorrespondenceDataModule`.
     """
 
     def __init__(

@@ -7,7 +7,7 @@ import json
 import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import MISSING, asdict, dataclass, field, fields
+from dataclasses import MISSING, asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -155,6 +155,44 @@ def result_row(
         auc=mean("auc"),
         flip_rate=None if math.isnan(flip_rate) else flip_rate,
         protocol=protocol.describe(n_pairs),
+    )
+
+
+def average_seeds(rows: Iterable[ResultRow]) -> list[ResultRow]:
+    """Average rows that differ only in their seed; the command and versions are those of the first.
+
+    Raises
+    ------
+    DataError
+        If rows of one key follow different protocols, numbers of epochs, or repeat a seed.
+    """
+    groups: dict[Key, list[ResultRow]] = {}
+    for row in rows:
+        groups.setdefault(row.key, []).append(row)
+    return [_average(group) if len(group) > 1 else group[0] for group in groups.values()]
+
+
+def _average(rows: Sequence[ResultRow]) -> ResultRow:
+    first = rows[0]
+    seeds = tuple(seed for row in rows for seed in row.seeds)
+    if len({(row.protocol, row.epochs) for row in rows}) > 1 or len(set(seeds)) < len(seeds) or len(seeds) < len(rows):
+        raise DataError(
+            f"{first.method} on {first.test}: rows of {len(rows)} seeds differ in protocol or epochs or repeat a seed, "
+            "so they have no mean"
+        )
+
+    def mean(name: str) -> float | None:
+        values = [getattr(row, name) for row in rows]
+        return None if None in values else float(np.mean(values))
+
+    averaged: dict[str, Any] = {name: mean(name) for name in ("age", "exact_match", "p95", "auc", "flip_rate")}
+    return replace(
+        first,
+        **averaged,
+        age_std=float(np.std([row.age for row in rows], ddof=1)),
+        seeds=seeds,
+        seconds=round(sum(row.seconds for row in rows), 1),
+        commit=" ".join(dict.fromkeys(row.commit for row in rows)),
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from pickle import UnpicklingError
 from typing import Any, Literal, cast
 
 import lightning as L
@@ -13,7 +12,7 @@ from torch.optim import Adam
 from torch.optim.lr_scheduler import CosineAnnealingLR, LRScheduler, OneCycleLR, StepLR
 
 from csm.data.datamodule import ShapeSample
-from csm.errors import ConfigError, DataError
+from csm.errors import ConfigError, CsmError, DataError
 from csm.learning.loss import Products, linear_cross_entropy
 from csm.networks import Basis, CorrespondenceNetwork, build
 
@@ -131,7 +130,7 @@ class CSMModule(L.LightningModule):
             case "step":
                 return StepLR(optimizer, max(1, steps // 3), gamma=0.5)
             case "one_cycle":
-                return OneCycleLR(optimizer, self.lr, total_steps=steps)
+                return OneCycleLR(optimizer, self.lr, total_steps=steps + 1)  # it is stepped once after the last step
         raise ConfigError(f"schedule is constant, cosine, step or one_cycle, got {self.schedule!r}")
 
 
@@ -147,5 +146,8 @@ def load_module(path: Path) -> CSMModule:
         raise DataError(f"{path}: there is no such checkpoint; csm train writes model.ckpt into its output folder")
     try:
         return CSMModule.load_from_checkpoint(path, map_location="cpu", weights_only=True)
-    except (UnpicklingError, RuntimeError, KeyError, TypeError, EOFError) as error:
-        raise DataError(f"{path}: not a checkpoint of csm ({str(error).splitlines()[0]})") from error
+    except CsmError:
+        raise
+    except Exception as error:  # a foreign file can trip the reader in any way
+        why = (str(error) or type(error).__name__).splitlines()[0]
+        raise DataError(f"{path}: not a checkpoint of csm ({why})") from error

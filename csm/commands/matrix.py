@@ -1,0 +1,115 @@
+"""``csm matrix``: train every row once per seed, test it on every test set, resumable cell by cell.
+
+The folder holds, per row and seed, ``model.ckpt`` and one json per test set.  What is there is not made again, so a
+killed matrix is started again with the same command; a training goes on from its last epoch.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from hydra import compose
+from omegaconf import DictConfig, open_dict
+
+from csm.commands.app import command, make_datamodule
+from csm.commands.testing import protocol_of, test_on
+from csm.commands.train import fit
+from csm.data.datamodule import CorrespondenceDataModule
+from csm.errors import ConfigError, CsmError
+from csm.evaluation.report import ResultRow, add_rows, average_seeds, read_rows, write_curves_csv, write_rows
+from csm.evaluation.tables import markdown_table
+from csm.learning.module import CSMModule, load_module
+
+_log = logging.getLogger(__name__)
+
+
+def run(cfg: DictConfig) -> dict[str, Any]:
+    """Fill the cells that are missing, then write the table over all of them."""
+    if not cfg.rows:
+        raise ConfigError("matrix needs rows, such as '+rows.mine=[experiment=humans]', or an experiment that has them")
+    folder = Path(cfg.folder)
+    rows: list[ResultRow] = []
+    failures: list[str] = []
+    for name, overrides in cfg.rows.items():
+        for seed in cfg.seeds:
+            try:
+                rows += Cells(cfg, str(name), list(overrides), int(seed), folder / str(name) / f"seed{seed}").fill()
+            except CsmError as error:
+                failures.append(f"{name}, seed {seed}: {error}")
+                _log.error("%s", failures[-1])
+    table = average_seeds(rows)
+    if table:
+        write_rows(folder / "table.json", table)
+        print(markdown_table(table))
+    if cfg.results and table:
+        add_rows(cfg.results, table)
+    if failures:
+        raise ConfigError(f"{len(failures)} rows of the matrix failed, the others are done:\n" + "\n".join(failures))
+    return {f"age/{row.method}/{row.test}": row.age for row in table}
+
+
+class Cells:
+    """One row and seed of a matrix: a training and its tests, each made when it is first needed.
+
+    Parameters
+    ----------
+    cfg
+        Of the matrix.
+    name, overrides, seed
+        The row: what it is called in the table, what it changes in the configuration of ``csm train``, the seed.
+    folder
+        Where checkpoint and cells are kept.
+    """
+
+    def __init__(self, cfg: DictConfig, name: str, overrides: Sequence[str], seed: int, folder: Path) -> None:
+        self.name, self.seed, self.folder, self.table = name, seed, folder, str(cfg.table)
+        self.protocol = protocol_of(cfg.metric)
+        last = folder / "checkpoints" / "last.ckpt"
+        self.train_cfg = compose("train", overrides=[*overrides, *cfg.overrides])
+        with open_dict(self.train_cfg):
+            self.train_cfg.update(
+                name=name,
+                seed=seed,
+                store=cfg.store,
+                workers=cfg.workers,
+                resume=str(last) if last.exists() else None,
+            )
+
+    @cached_property
+    def datamodule(self) -> CorrespondenceDataModule:
+        """The data module of the row."""
+        return make_datamodule(self.train_cfg)
+
+    @cached_property
+    def module(self) -> CSMModule:
+        """The trained network: the one in the folder, or trained now."""
+        checkpoint = self.folder / "model.ckpt"
+        if checkpoint.exists():
+            return load_module(checkpoint)
+        return fit(self.train_cfg, self.datamodule, self.folder)[0]
+
+    def fill(self) -> list[ResultRow]:
+        """Return the row of every test set, from its file where that answers the same question."""
+        return [self._cell(name) for name in self.datamodule.test_sets]
+
+    def _cell(self, test: str) -> ResultRow:
+        path = self.folder / f"{test}_{self.protocol.distance}_{self.protocol.normaliser}.json"
+        if path.exists():
+            (row,) = read_rows(path)
+            if row.protocol == self.protocol.describe(row.pairs):
+                return row
+            _log.warning("%s answers another protocol (%s); it is made again", path, row.protocol)
+        tested = test_on(self.module, self.datamodule, self.datamodule.test_sets[test], self.protocol, self.table)
+        write_rows(path, [tested.row])
+        write_curves_csv(path.with_suffix(".cqc.csv"), {test: tested.evaluation})
+        return tested.row
+
+
+main = command("matrix")(run)
+
+if __name__ == "__main__":
+    main()

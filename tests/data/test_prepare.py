@@ -1,0 +1,65 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from csm.data.folder import recognise
+from csm.data.prepare import Job, Recipe, compute_features, prepare, prepare_shape
+from csm.data.store import Store
+from csm.descriptors import ACD
+from csm.mesh.io import write_mesh
+from csm.mesh.shape import Mesh
+from tests.toyset import write_toys
+
+RECIPE = Recipe(ACD(angles=3, k=5, order=2), 10)
+
+
+@pytest.fixture
+def toys(tmp_path):
+    return recognise(write_toys(tmp_path / "toys", 4))
+
+
+def jobs(shapes) -> list[Job]:
+    return [Job(shapes, name) for name in shapes.names]
+
+
+@pytest.mark.parametrize("workers", [0, 2])
+def test_a_second_run_finds_everything(toys, tmp_path, workers):
+    store = Store(tmp_path / "store")
+    first = prepare(jobs(toys), RECIPE, store, workers=workers, progress=False)
+    second = prepare(jobs(toys), RECIPE, store, workers=workers, progress=False)
+    assert (first.made, first.present, first.failures) == (4, 0, [])
+    assert (second.made, second.present) == (0, 4)
+
+
+def test_an_interrupted_run_goes_on_where_it_was(toys, tmp_path):
+    store = Store(tmp_path / "store")
+    prepare(jobs(toys)[:3], RECIPE, store, workers=0, progress=False)
+    summary = prepare(jobs(toys), RECIPE, store, workers=0, progress=False)
+    assert (summary.made, summary.present) == (1, 3)
+
+
+def test_one_bad_shape_does_not_stop_the_others_and_is_named(toys, tmp_path):
+    mesh = toys.load("toy0").mesh
+    lonely = Mesh(np.vstack([mesh.vertices, [[9.0, 9.0, 9.0]]]), mesh.faces)
+    write_mesh(tmp_path / "toys" / "toy1.off", lonely)
+    (tmp_path / "toys" / "toy2.off").write_text("OFF\n3 1 0\n0 0 0\n")
+    summary = prepare(jobs(toys), RECIPE, Store(tmp_path / "store"), workers=0, progress=False)
+    assert summary.made == 2
+    assert [label for label, _ in summary.failures] == ["toys/toy1", "toys/toy2"]
+    assert "toy2.off" in summary.table()
+
+
+def test_features_are_the_descriptor_in_float32(toys, tmp_path):
+    mesh = toys.load("toy3").mesh
+    features = compute_features(mesh, RECIPE.descriptor, Store(tmp_path / "store"))
+    assert features.dtype == np.float32
+    np.testing.assert_allclose(features, RECIPE.descriptor(mesh).values, rtol=1e-6)
+
+
+def test_another_parameter_is_another_entry(toys, tmp_path):
+    store, shape = Store(tmp_path / "store"), toys.load("toy0")
+    prepare_shape(shape, RECIPE, store)
+    before = store.computed
+    prepare_shape(shape, Recipe(ACD(angles=3, k=5, order=2, sweeps=2), 10), store)
+    assert store.computed == before + 1
