@@ -87,7 +87,9 @@ def make_trainer(cfg: DictConfig, folder: Path) -> L.Trainer:
     """Make the trainer with its callbacks; the last checkpoint is kept so that a killed run can go on."""
     callbacks = [
         ValidationErrors(seed=cfg.seed),
-        ModelCheckpoint(folder / "checkpoints", save_last=True, save_top_k=0, every_n_epochs=1),
+        ModelCheckpoint(
+            folder / "checkpoints", filename="last", enable_version_counter=False, save_on_train_epoch_end=True
+        ),
         TQDMProgressBar(leave=False),
     ]
     logger = instantiate(cfg.logger, _partial_=True)(save_dir=folder) if cfg.logger else False
