@@ -10,7 +10,7 @@ import numpy as np
 from csm._types import BoolArray, FloatArray, IntArray
 from csm.evaluation.metrics import FLIP_MARGIN, flipped
 from csm.mesh.shape import Mesh
-from csm.operators.geodesic import Geodesics, Method, diameter, geodesics
+from csm.operators.geodesic import Geodesics, Method, geodesics
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,9 +83,9 @@ def target_errors(mesh: Mesh, method: Method, normaliser: str, sources: Sequence
     sources
         Matches of each source shape.
     """
-    lengths = Lengths(diameter(mesh, method), float(np.sqrt(mesh.area)))
-    margin = FLIP_MARGIN * float(getattr(lengths, normaliser))
     surface = geodesics(mesh, method)
+    lengths = Lengths(surface.diameter(), float(np.sqrt(mesh.area)))
+    margin = FLIP_MARGIN * float(getattr(lengths, normaliser))
     missed = [p.truth != p.matched for p in sources]
     found = _distances(
         surface,

@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 from csm._types import BoolArray, FloatArray, IntArray
 from csm.errors import ConfigError, MeshError
+from csm.mesh.check import check
 from csm.mesh.shape import Mesh
 from csm.operators._pairs import PairPlan, plan_pairs
 
@@ -34,6 +35,9 @@ class Geodesics(Protocol):
 
     def pairs(self, sources: IntArray, targets: IntArray) -> FloatArray:
         """Return the distance from ``sources[i]`` to ``targets[i]``, shape (P,), without computing whole rows."""
+
+    def diameter(self, max_rows: int = 8) -> float:
+        """Estimate the largest distance from below; see `diameter`."""
 
 
 def geodesics(mesh: Mesh, method: Method = "exact") -> Geodesics:
@@ -56,8 +60,7 @@ def geodesics(mesh: Mesh, method: Method = "exact") -> Geodesics:
     ConfigError
         If the method is unknown.
     MeshError
-        If the mesh has no faces, or (exact only) an edge with more than two faces, of zero length, or a face that
-        names a vertex twice.
+        If the mesh has no faces, or (exact only) is not a manifold or has an edge of no length.
     """
     kinds: dict[str, type[_OnMesh]] = {"exact": _Exact, "heat": _Heat, "edge": _Edge}
     if method not in kinds:
@@ -84,19 +87,7 @@ def diameter(mesh: Mesh, method: Method = "exact", *, max_rows: int = 8) -> floa
     max_rows
         Rows computed at most.
     """
-    field = geodesics(mesh, method)
-    here, longest = _vertex_of_largest_component(mesh), 0.0
-    bound = np.full(mesh.n_vertices, np.inf)
-    for _ in range(max_rows):
-        row = field.rows(np.array([here]))[0]
-        row[~np.isfinite(row)] = -np.inf
-        reach = float(row.max())
-        bound = np.minimum(bound, row + reach)
-        here = int((row if reach > longest else bound).argmax())
-        longest = max(longest, reach)
-        if bound.max() <= longest:
-            break
-    return longest
+    return geodesics(mesh, method).diameter(max_rows)
 
 
 class _OnMesh:
@@ -125,8 +116,8 @@ class _OnMesh:
             row[source] = 0.0
             at = self.local[source]
             if at >= 0:
-                reached = self.component == self.component[at]
-                row[self.used[reached]] = self._row(at)[reached]
+                reached = np.flatnonzero(self.component == self.component[at])
+                row[self.used[reached]] = self._reach(at, reached)
         return out
 
     def pairs(self, sources: IntArray, targets: IntArray) -> FloatArray:
@@ -139,10 +130,24 @@ class _OnMesh:
         out[joined] = self._run(plan)
         return out
 
+    def diameter(self, max_rows: int = 8) -> float:
+        largest = np.flatnonzero(self.component == np.bincount(self.component).argmax())
+        here, longest = largest[0], 0.0
+        bound = np.full(len(largest), np.inf)
+        for _ in range(max_rows):
+            row = self._reach(here, largest)
+            reach = float(row.max())
+            bound = np.minimum(bound, row + reach)
+            here = largest[(row if reach > longest else bound).argmax()]
+            longest = max(longest, reach)
+            if bound.max() <= longest:
+                break
+        return longest
+
     def _run(self, plan: PairPlan) -> FloatArray:
         parts = itertools.pairwise(plan.starts)
         found = [
-            self._some(int(source), plan.targets[start:stop])
+            self._reach(source, plan.targets[start:stop])
             for source, (start, stop) in zip(plan.sources, parts, strict=True)
         ]
         return np.concatenate([np.empty(0), *found])[plan.inverse]
@@ -164,11 +169,9 @@ class _OnMesh:
     def _prepare(self) -> None:
         """Set up what the method needs once per mesh."""
 
-    def _row(self, source: int) -> FloatArray:
+    def _reach(self, source: int, targets: IntArray) -> FloatArray:
+        """Measure from a used vertex to others of its component, all numbered among the used ones."""
         raise NotImplementedError
-
-    def _some(self, source: int, targets: IntArray) -> FloatArray:
-        return self._row(source)[targets]
 
 
 class _Exact(_OnMesh):
@@ -178,12 +181,9 @@ class _Exact(_OnMesh):
         _require_window_propagation(self.mesh)
         self.algorithm = PyGeodesicAlgorithmExact(self.vertices, self.faces)
 
-    def _row(self, source: int) -> FloatArray:
-        found: FloatArray = self.algorithm.geodesicDistances(np.array([source]))[0]
-        return found
-
-    def _some(self, source: int, targets: IntArray) -> FloatArray:
-        # With the limit 0, propagation goes on exactly until the front has passed the last target.
+    def _reach(self, source: int, targets: IntArray) -> FloatArray:
+        # With the limit 0 the front goes on exactly until it has passed the last target.  Asking for a vertex that it
+        # never reaches would give an undefined number, which is why targets stay inside one component.
         found: FloatArray = self.algorithm.geodesicDistances(np.array([source]), targets, 0.0)[0]
         return found
 
@@ -195,21 +195,22 @@ class _Heat(_OnMesh):
     def _prepare(self) -> None:
         self.solver = potpourri3d.MeshHeatMethodDistanceSolver(self.vertices, self.faces)
 
-    def _row(self, source: int) -> FloatArray:
-        return np.asarray(self.solver.compute_distance(source), dtype=np.float64)
+    def _reach(self, source: int, targets: IntArray) -> FloatArray:
+        row: FloatArray = self.solver.compute_distance(source)
+        return row[targets]
 
 
 class _Edge(_OnMesh):
     method = "edge"
 
-    def _row(self, source: int, limit: float = np.inf) -> FloatArray:
+    def _reach(self, source: int, targets: IntArray) -> FloatArray:
+        straight = np.linalg.norm(self.vertices[targets] - self.vertices[source], axis=1).max()
+        near = self._dijkstra(source, limit=2.0 * float(straight))[targets]
+        return near if np.isfinite(near).all() else self._dijkstra(source, limit=np.inf)[targets]
+
+    def _dijkstra(self, source: int, limit: float) -> FloatArray:
         row: FloatArray = dijkstra(self.graph, directed=False, indices=np.array([source]), limit=limit)[0]
         return row
-
-    def _some(self, source: int, targets: IntArray) -> FloatArray:
-        straight = np.linalg.norm(self.vertices[targets] - self.vertices[source], axis=1).max()
-        found = self._row(source, limit=2.0 * float(straight))[targets]
-        return found if np.isfinite(found).all() else self._row(source)[targets]
 
 
 def _edge_graph(vertices: FloatArray, faces: IntArray) -> csr_array:
@@ -221,23 +222,15 @@ def _edge_graph(vertices: FloatArray, faces: IntArray) -> csr_array:
     return coo_array((lengths, (edges[:, 0], edges[:, 1])), shape=(len(vertices), len(vertices))).tocsr()
 
 
-def _vertex_of_largest_component(mesh: Mesh) -> int:
-    component = connected_components(_edge_graph(mesh.vertices, mesh.faces), directed=False)[1]
-    return int(np.argmax(component == np.bincount(component).argmax()))
-
-
 def _require_window_propagation(mesh: Mesh) -> None:
-    half_edges = np.sort(mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    edges, count = np.unique(half_edges, axis=0, return_counts=True)
-    length = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
-    for bad, what in (
-        (edges[:, 0] == edges[:, 1], "a face names this vertex twice"),
-        (count > 2, "more than two faces share this edge"),
-        (~(length > 0), "this edge has no length"),
-    ):
-        if bad.any():
-            a, b = edges[np.argmax(bad)]
-            raise MeshError(
-                f"{mesh.name}: exact geodesics cannot pass vertices {a} and {b}: {what} ({int(bad.sum())} such "
-                "places); mend the mesh (`csm check` lists them) or choose the distance heat or edge"
-            )
+    problems = [
+        f"{f.text} ({f.count})" for f in check(mesh) if f.kind in ("non_manifold_edges", "non_manifold_vertices")
+    ]
+    heads, tails = mesh.corners, mesh.corners[:, [1, 2, 0]]
+    if (no_length := (heads == tails).all(axis=2)).any():
+        problems.append(f"edges of no length ({int(no_length.sum())})")
+    if problems:
+        raise MeshError(
+            f"{mesh.name}: exact geodesics need a manifold, but there are {'; '.join(problems)}; mend the mesh, or "
+            "choose the distance heat or edge"
+        )

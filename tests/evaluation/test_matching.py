@@ -1,0 +1,86 @@
+"""Nearest neighbours against brute force in float64, with ties, blocks, offsets and both libraries."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from scipy.spatial.distance import cdist
+
+from csm.errors import ConfigError
+from csm.evaluation import matching
+from csm.evaluation.matching import match_features, nearest, nearest_at
+
+
+def features(n: int, width: int, seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).normal(size=(n, width))
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("block", [1, 37, 4096])
+def test_equals_brute_force(dtype: type, block: int) -> None:
+    q, c = (features(n, 24, n).astype(dtype) for n in (300, 411))
+    expected = cdist(q.astype(np.float64), c.astype(np.float64)).argmin(1)
+    np.testing.assert_array_equal(nearest(q, c, block=block), expected)
+    np.testing.assert_array_equal(nearest(torch.from_numpy(q), torch.from_numpy(c), block=block), expected)
+
+
+def test_a_large_common_offset_does_not_hide_small_differences() -> None:
+    offset = np.float32(1000.0)
+    q, c = (offset + 0.05 * features(200, 8, seed).astype(np.float32) for seed in (0, 1))
+    np.testing.assert_array_equal(nearest(q, c), cdist(q.astype(np.float64), c.astype(np.float64)).argmin(1))
+
+
+def test_float32_is_decided_in_float64_when_candidates_nearly_coincide() -> None:
+    c = features(50, 16, 0).astype(np.float32)
+    twins = np.concatenate([c + np.float32(1e-5), c])
+    np.testing.assert_array_equal(nearest(c, twins), np.arange(50, 100))
+
+
+@pytest.mark.parametrize("block", [5, 2048])
+def test_ties_go_to_the_lowest_index(block: int) -> None:
+    c = np.random.default_rng(0).integers(0, 3, (400, 3)).astype(np.float32)
+    found = nearest(c, c, block=block)
+    first = [int(np.flatnonzero((c == row).all(1))[0]) for row in c]
+    assert found.tolist() == first
+    assert nearest(np.zeros((7, 2)), np.zeros((9, 2))).tolist() == [0] * 7
+
+
+def test_memory_is_bounded_whatever_the_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[int] = []
+    product = torch.addmm
+
+    def watched(*args: torch.Tensor, **kwargs: float) -> torch.Tensor:
+        out = product(*args, **kwargs)
+        seen.append(out.numel())
+        return out
+
+    monkeypatch.setattr(matching, "_MAX_ELEMENTS", 5000)
+    monkeypatch.setattr(torch, "addmm", watched)
+    q, c = features(123, 4, 0), features(700, 4, 1)
+    np.testing.assert_array_equal(nearest(q, c), cdist(q, c).argmin(1))
+    assert max(seen) <= 5000
+
+
+def test_only_the_vertices_asked_for() -> None:
+    q, c = features(30, 5, 0), features(20, 5, 1)
+    at = np.array([3, 17, 4])
+    for rows in (q, torch.from_numpy(q)):
+        found = nearest_at(rows, c, at)
+        assert found[at].tolist() == nearest(q, c)[at].tolist()
+        assert (np.delete(found, at) == -1).all()
+
+
+def test_match_knows_its_coverage_and_names() -> None:
+    match = match_features(np.array([[0.0], [0.1], [5.0]]), np.arange(4.0)[:, None], source_name="a", target_name="b")
+    assert match.indices.tolist() == [0, 0, 3]
+    assert (match.coverage, match.source, match.target) == (0.5, "a", "b")
+
+
+def test_what_has_no_nearest_neighbour_is_refused() -> None:
+    with pytest.raises(ConfigError, match="not finite"):
+        nearest(np.array([[np.nan]]), np.zeros((2, 1)))
+    with pytest.raises(ConfigError, match=r"\(2, 3\) against \(2, 4\)"):
+        nearest(np.zeros((2, 3)), np.zeros((2, 4)))
+    with pytest.raises(ConfigError, match="N' > 0"):
+        nearest(np.zeros((2, 3)), np.zeros((0, 3)))

@@ -1,0 +1,127 @@
+"""Result rows survive the disk, refuse what cannot be true, and merge by cell."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from csm.errors import DataError
+from csm.evaluation import report
+from csm.evaluation.protocol import Protocol, evaluate_matches
+from csm.evaluation.provenance import Provenance
+from csm.evaluation.report import ResultRow, add_rows, merge_rows, read_rows, result_row, write_rows
+from tests.evaluation.test_protocol import noisy, shapes
+
+MADE = Provenance("csm train", "abc123", {"torch": "2.13.0"})
+
+
+def row(**changes: object) -> ResultRow:
+    base = ResultRow(
+        table="4",
+        method="CSMCNN",
+        train="FAUST",
+        test="FAUST 6890",
+        age=0.0097,
+        age_std=0.0003,
+        exact_match=0.61,
+        seeds=(0, 1, 2),
+        epochs=50,
+        pairs=380,
+        distance="exact",
+        normaliser="diameter",
+        command="csm train",
+        commit="abc",
+        versions={"numpy": "2"},
+        seconds=61.5,
+    )
+    return replace(base, **changes)  # type: ignore[arg-type]
+
+
+def test_rows_come_back_from_disk_as_they_were(tmp_path: Path) -> None:
+    rows = [row(), row(test="FAUST 10000", age_std=None, epochs=None, seeds=(), p95=0.02, flip_rate=0.0)]
+    write_rows(tmp_path / "new" / "r.json", rows)
+    assert read_rows(tmp_path / "new" / "r.json") == rows
+    entry = json.loads((tmp_path / "new" / "r.json").read_text())[0]
+    wanted = "table method train test age age_std exact_match seeds epochs pairs distance normaliser command commit"
+    assert {*wanted.split(), "versions", "seconds"} <= set(entry)
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "r.json"
+    write_rows(path, [row()])
+    monkeypatch.setattr(report.json, "dumps", lambda *a, **k: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        write_rows(path, [row(age=0.5)])
+    assert read_rows(path) == [row()]
+    assert [p.name for p in tmp_path.iterdir()] == ["r.json"]
+
+
+def test_a_new_row_replaces_its_cell_and_keeps_the_order(tmp_path: Path) -> None:
+    a, b, c = row(), row(test="FAUST 15000"), row(test="SCAPE")
+    better = row(age=0.009, commit="def")
+    assert merge_rows([a, b], [better, c]) == [better, b, c]
+    assert merge_rows([a], [row(distance="edge")])[0] == a
+    path = tmp_path / "r.json"
+    add_rows(path, [a, b])
+    assert add_rows(path, [better, c]) == read_rows(path) == [better, b, c]
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("age", -1.0),
+        ("age", float("nan")),
+        ("exact_match", 1.2),
+        ("auc", 7.0),
+        ("pairs", 0),
+        ("commit", ""),
+        ("age", None),
+    ],
+)
+def test_values_that_cannot_be_true(field: str, value: object) -> None:
+    with pytest.raises(DataError, match=field):
+        row(**{field: value})
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [("{}", "wanted a list"), ("[3]", "row 0 is a int"), ('[{"table": "4"}]', "lacks.*'age'"), ("[", "not a json")],
+)
+def test_foreign_files_are_refused_by_name(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "r.json"
+    path.write_text(text)
+    with pytest.raises(DataError, match=f"r.json.*{said}"):
+        read_rows(path)
+
+
+def test_a_row_averages_over_seeds() -> None:
+    items = shapes()
+    runs = [evaluate_matches(items, m, Protocol(), progress=False) for m in (noisy, lambda s, t: np.arange(162))]
+    made = result_row(runs, MADE, table="4", method="m", train="a", test="b", seeds=[0, 1], epochs=5)
+    ages = [run.summary["age"] for run in runs]
+    assert made.age == pytest.approx(np.mean(ages))
+    assert made.age_std == pytest.approx(np.std(ages, ddof=1))
+    assert made.protocol == Protocol().describe(6)
+    single = result_row(runs[:1], MADE, table="4", method="m", train="a", test="b", seeds=[0], epochs=5)
+    assert single.age_std is None
+    other = evaluate_matches(items, noisy, Protocol(distance="edge"), progress=False)
+    with pytest.raises(DataError, match="one protocol"):
+        result_row([runs[0], other], MADE, table="4", method="m", train="a", test="b", seeds=[0], epochs=5)
+
+
+def test_csv_of_rows_and_of_curves(tmp_path: Path) -> None:
+    report.write_table_csv(tmp_path / "t.csv", [row()])
+    with (tmp_path / "t.csv").open() as file:
+        line = next(csv.DictReader(file))
+    assert (line["method"], line["age"], line["seeds"]) == ("CSMCNN", "0.0097", "0 1 2")
+    run = evaluate_matches(shapes(2), noisy, Protocol(), progress=False)
+    report.write_curves_csv(tmp_path / "c.csv", {"ours": run})
+    values = np.loadtxt(tmp_path / "c.csv", delimiter=",", skiprows=1)
+    np.testing.assert_allclose(values, np.column_stack([run.thresholds, run.cqc]), atol=1e-6)
+    with pytest.raises(DataError, match="no curve"):
+        report.write_curves_csv(tmp_path / "c.csv", {})
