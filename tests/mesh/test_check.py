@@ -190,9 +190,9 @@ def test_findings_do_not_change_with_the_order_of_faces():
 
 def test_fast_enough_for_fifteen_thousand_vertices():
     mesh = torus(n=150, m=100)
-    begun = time.perf_counter()
+    begun = time.process_time()
     check(mesh)
-    assert time.perf_counter() - begun < 1.0  # measured: 0.05 s
+    assert time.process_time() - begun < 0.3  # measured: 0.05 s
 
 
 @pytest.mark.data

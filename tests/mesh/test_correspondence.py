@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from csm.errors import DataError
@@ -46,6 +46,7 @@ def test_arrays_are_copied_and_frozen():
         found.indices[0] = 1
 
 
+@settings(deadline=None)
 @given(point_maps(TO_TEMPLATE))
 def test_inversion_takes_the_first_vertex_of_each_template_point(backward):
     forward = backward.as_template_to_shape()
@@ -57,6 +58,7 @@ def test_inversion_takes_the_first_vertex_of_each_template_point(backward):
         assert forward.indices[point] == (vertices[0] if len(vertices) else -1)
 
 
+@settings(deadline=None)
 @given(point_maps(TO_SHAPE))
 def test_a_map_in_the_right_direction_stays(found):
     assert found.as_template_to_shape() is found
@@ -76,6 +78,7 @@ def test_a_map_of_another_template_is_refused():
         PointMap(np.array([0, 1, 2]), TO_TEMPLATE, 5).as_template_to_shape(3)
 
 
+@settings(deadline=None)
 @given(st.integers(1, 15).flatmap(lambda n: st.tuples(point_maps(n_from=n), point_maps(n_from=n))))
 def test_ground_truth_is_the_join_over_template_points(maps):
     a, b = maps

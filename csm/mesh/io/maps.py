@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from csm.errors import DataError, MeshError
 from csm.mesh.correspondence import Direction, PointMap
 from csm.mesh.io.files import atomic_path, read_bytes
 from csm.mesh.io.matlab import label_vector
+from csm.mesh.io.raw import is_number
 
 _SIDES = {
     Direction.TEMPLATE_TO_SHAPE: ("template point", "vertex of the shape"),
@@ -97,19 +99,21 @@ def _mat_numbers(path: Path) -> NDArray[Any]:
 
 
 def _text_numbers(path: Path) -> NDArray[Any]:
-    words = [line.split() for line in _lines(path)]
-    wide = next((i for i, row in enumerate(words) if len(row) != 1), None)
-    if wide is not None and len(words) > 1:
-        raise DataError(f"{path}: entry {wide + 1} is {' '.join(words[wide])!r}, wanted one number per line")
+    lines = _lines(path)
+    words = lines[0].split() if len(lines) == 1 else lines
     try:
-        return np.array([word for row in words for word in row], dtype=np.float64)
-    except ValueError as error:
-        raise DataError(f"{path}: wanted one number per line ({error})") from None
+        return np.array(words, dtype=np.float64)
+    except ValueError:
+        first = next(i for i, word in enumerate(words) if not is_number(word))
+        raise DataError(f"{path}: entry {first + 1} is {words[first]!r}, wanted one number per line") from None
 
 
 def _lines(path: Path) -> list[str]:
+    """Return the lines of a text file that are more than a comment, without comments and surrounding blanks."""
     text = read_bytes(path).decode("utf-8-sig", errors="replace")
-    return [line for raw in text.splitlines() if (line := raw.partition("#")[0].strip())]
+    if "#" in text:
+        text = re.sub(r"#[^\r\n]*", "", text)
+    return [line for raw in text.splitlines() if (line := raw.strip())]
 
 
 def read_names(path: str | os.PathLike[str]) -> list[str]:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from csm.errors import MeshError
+from csm.errors import DataError, MeshError
 from csm.mesh.io.files import atomic_path, read_bytes, read_bytes_of_head
 from csm.mesh.io.matlab import parse_mat
 from csm.mesh.io.obj import format_obj, parse_obj
@@ -26,10 +26,15 @@ from csm.mesh.shape import Mesh
 
 def parse_npz(data: bytes) -> RawMesh:
     """Read the arrays `vertices` (N, 3) and `faces` (M, 3), 0-based, of a NumPy archive; pickles are refused."""
+    if not data.startswith(b"PK"):
+        raise MeshError("this is no NumPy archive")
     with np.load(io.BytesIO(data), allow_pickle=False) as archive:
         if not {"vertices", "faces"} <= set(archive.files):
             raise MeshError(f"wanted the arrays 'vertices' and 'faces', found {', '.join(archive.files) or 'none'}")
-        return RawMesh(archive["vertices"], archive["faces"])
+        try:
+            return RawMesh(archive["vertices"], archive["faces"])
+        except ValueError as error:
+            raise MeshError("'vertices' or 'faces' holds Python objects, wanted numbers") from error
 
 
 _PARSERS: Mapping[str, Callable[[bytes], RawMesh]] = MappingProxyType(
@@ -79,9 +84,10 @@ def read_mesh(path: str | os.PathLike[str], name: str | None = None) -> Mesh:
 
 
 def _parsed(path: Path, parse: Callable[[bytes], RawMesh]) -> RawMesh:
-    if not path.is_file():
-        raise MeshError(f"{path}: there is no such file")
-    data = read_bytes(path)
+    try:
+        data = read_bytes(path)
+    except DataError as error:
+        raise MeshError(str(error)) from error.__cause__
     if not data:
         raise MeshError(f"{path}: the file is empty")
     try:
@@ -89,7 +95,7 @@ def _parsed(path: Path, parse: Callable[[bytes], RawMesh]) -> RawMesh:
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from error.__cause__
     except Exception as error:  # a damaged file makes the libraries raise whatever they trip over
-        raise MeshError(f"{path}: not a readable {path.suffix} file ({error})") from error
+        raise MeshError(f"{path}: this is no {path.suffix} file, or it is damaged or cut short ({error})") from error
 
 
 def count_vertices(path: Path) -> int:

@@ -38,7 +38,7 @@ def coordinates(rows: Sequence[Sequence[str]]) -> FloatArray:
         return np.array([row[:3] for row in rows], dtype=np.float64).reshape(len(rows), 3)
     except ValueError:
         for i, row in enumerate(rows):
-            if len(row) < 3 or not all(_is_number(word) for word in row[:3]):
+            if len(row) < 3 or not all(is_number(word) for word in row[:3]):
                 raise MeshError(f"vertex {i} is {' '.join(row)!r}, wanted three numbers") from None
         raise
 
@@ -51,7 +51,8 @@ def polygon_error(face: int, n_corners: int) -> MeshError:
     )
 
 
-def _is_number(word: str) -> bool:
+def is_number(word: str) -> bool:
+    """Tell whether Python reads the word as a number."""
     try:
         float(word)
     except ValueError:

@@ -3,7 +3,7 @@ import tarfile
 import zipfile
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from csm.errors import DataError
@@ -35,12 +35,14 @@ def test_atomic_path_makes_folders_and_leaves_one_file(tmp_path):
     assert [p.name for p in target.parent.iterdir()] == ["a.npz"]
 
 
+@settings(deadline=None)
 @given(st.lists(st.integers(0, 10**6), unique=True))
 def test_natural_order_is_the_order_of_numbers(numbers):
     names = [f"cat{n}" for n in numbers]
     assert sorted(names, key=natural_key) == [f"cat{n}" for n in sorted(numbers)]
 
 
+@settings(deadline=None)
 @given(st.lists(st.text(max_size=8), unique=True), st.randoms())
 def test_natural_order_is_an_order_of_any_names(names, random):
     keys = sorted(natural_key(name) for name in names)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 import scipy.io
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from csm.errors import DataError
@@ -98,6 +98,7 @@ def test_names(tmp_path):
     assert read_names(tmp_path / "n.txt") == ["mesh000", "mesh001"]
 
 
+@settings(deadline=None)
 @given(st.lists(st.integers(-1, 50), min_size=1))
 def test_text_maps_read_back(tmp_path_factory, values):
     path = tmp_path_factory.mktemp("map") / "m.txt"

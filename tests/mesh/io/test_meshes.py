@@ -47,7 +47,7 @@ def test_npz_with_other_keys_or_pickles_is_refused(tmp_path):
     with pytest.raises(MeshError, match=r"a\.npz: wanted the arrays.*found verts, faces"):
         read_mesh(tmp_path / "a.npz")
     np.savez(tmp_path / "b.npz", vertices=np.array([{}], dtype=object), faces=np.eye(3))
-    with pytest.raises(MeshError, match=r"b\.npz: not a readable \.npz"):
+    with pytest.raises(MeshError, match=r"b\.npz.*Python objects"):
         read_mesh(tmp_path / "b.npz")
     np.savez(tmp_path / "c.npz", vertices=np.eye(3), faces=np.array([[0.0, 1, 2]]))
     with pytest.raises(MeshError, match=r"c\.npz.*float64, wanted integers"):
