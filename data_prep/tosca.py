@@ -2,7 +2,7 @@
 
 Unpacks, checks and lays out what you have downloaded as a folder that csm reads:
 
-    python data_prep/tosca.py DOWNLOAD... --out DATA
+    python data_prep/tosca.py DOWNLOAD... --out DATA [--store]
 """
 
 import sys

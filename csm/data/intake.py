@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +12,9 @@ from csm.data.folder import find_sets, recognise
 from csm.data.folderset import FolderSet
 from csm.data.inspection import Inspected, inspect
 from csm.data.kinds import Kind
+from csm.data.prepare import Job, Recipe, Summary, prepare
+from csm.data.store import Store
+from csm.descriptors.chebyshev import ACD
 from csm.errors import CsmError, DataError
 from csm.mesh.io import copy_file, unpacked
 
@@ -81,9 +84,15 @@ def lay_out(shapes: FolderSet, target: Path) -> FolderSet:
     return recognise(target)
 
 
-def script(
-    title: str, kinds: Sequence[Kind], argv: Sequence[str] | None = None, fill: Callable[[FolderSet], str] | None = None
-) -> int:
+def fill_store(shapes: FolderSet, store: Store) -> Summary:
+    """Compute what the paper's network needs, ACD and the eigenbasis, for all shapes with correspondence.
+
+    A command with other options asks for other descriptors; the store keeps both.
+    """
+    return prepare([Job(shapes, name) for name in shapes.mapped], Recipe(ACD()), store)
+
+
+def script(title: str, kinds: Sequence[Kind], argv: Sequence[str] | None = None) -> int:
     """Run a script of `data_prep/`: parse the arguments, take the sets in, report.
 
     Parameters
@@ -94,13 +103,11 @@ def script(
         What the script takes in.
     argv
         Arguments; by default the process's.
-    fill
-        Fills the store for one set and returns what to print; offered as `--store`.
 
     Returns
     -------
     int
-        Exit status: 0, 1 if some shape cannot be used, 2 after an error that the user can mend.
+        Exit status: 0, 1 if some shape cannot be used or prepared, 2 after an error that the user can mend.
     """
     parser = argparse.ArgumentParser(
         description=title,
@@ -108,19 +115,21 @@ def script(
     )
     parser.add_argument("source", nargs="+", type=Path, help="archives (.zip, .tar.xz, ...) or folders as published")
     parser.add_argument("--out", type=Path, required=True, help="folder that gets one folder per set")
-    if fill:
-        parser.add_argument("--store", action="store_true", help="compute bases and descriptors, too")
+    parser.add_argument("--store", action="store_true", help="compute the paper's descriptors and bases, too")
     options = parser.parse_args(argv)
     try:
         taken = [t for source in options.source for t in take_in(source, options.out, kinds)]
         for one in taken:
             print(one)
-            if fill and options.store:
-                print(fill(one.shapes))
+        filled = [fill_store(one.shapes, Store()) for one in taken if options.store]
     except CsmError as error:
         print(f"{parser.prog}: {error}", file=sys.stderr)
         return 2
-    return 0 if all(row.usable for one in taken for row in one.rows) else 1
+    for summary in filled:
+        print(f"{summary.made} prepared, {summary.present} already in the store, {len(summary.failures)} failed")
+        print(summary.table(), end="\n" if summary.failures else "")
+    good = all(row.usable for one in taken for row in one.rows) and not any(s.failures for s in filled)
+    return 0 if good else 1
 
 
 def _why(row: Inspected) -> list[str]:

@@ -7,7 +7,9 @@ from csm.data.folder import recognise
 from csm.data.intake import lay_out, script, take_in
 from csm.data.kinds import ACD_SCAPE, SGA18_TOSCA, SHREC19
 from csm.errors import DataError
+from csm.mesh.io import write_mesh
 from tests.data import layouts
+from tests.shapes import blob
 
 
 def contents(folder):
@@ -57,13 +59,17 @@ def test_the_source_is_never_written_to(tmp_path):
             lay_out(shapes, target)
 
 
-def test_script_reports_and_fills(tmp_path, capsys):
-    layouts.sga18(tmp_path / "in")
+def test_script_fills_the_store_once(tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("CSM_CACHE", str(tmp_path / "cache"))
+    layouts.sga18(tmp_path / "in", ("cat0", "cat1", "cat2"))
+    for name in ("cat1", "cat2"):
+        (tmp_path / "in" / "vtx_5k" / "corres" / f"{name}.vts").unlink()
+    write_mesh(tmp_path / "in" / "vtx_5k" / "cat0.off", blob(3))
     arguments = [str(tmp_path / "in"), "--out", str(tmp_path / "out"), "--store"]
-    assert script("A title.", [SGA18_TOSCA], arguments, fill=lambda shapes: f"filled {shapes.name}") == 0
-    printed = capsys.readouterr().out
-    assert "3 shapes" in printed
-    assert "filled TOSCA_5k_remeshed" in printed
+    assert script("A title.", [SGA18_TOSCA], arguments) == 0
+    assert "1 prepared, 0 already" in capsys.readouterr().out
+    assert script("A title.", [SGA18_TOSCA], arguments) == 0
+    assert "0 prepared, 1 already" in capsys.readouterr().out
 
 
 def test_script_status_tells_unusable_shapes_from_errors(tmp_path, capsys):
