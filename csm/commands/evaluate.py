@@ -16,7 +16,8 @@ from csm.descriptors import from_parameters
 from csm.errors import ConfigError
 from csm.evaluation.report import add_rows
 from csm.evaluation.tables import markdown_table
-from csm.learning.module import CSMModule, load_module
+from csm.learning.export import load_module
+from csm.learning.module import CSMModule
 
 
 def run(cfg: DictConfig) -> dict[str, Any]:

@@ -22,7 +22,8 @@ from csm.data.datamodule import CorrespondenceDataModule
 from csm.errors import ConfigError, CsmError
 from csm.evaluation.report import ResultRow, add_rows, average_seeds, read_rows, write_curves_csv, write_rows
 from csm.evaluation.tables import markdown_table
-from csm.learning.module import CSMModule, load_module
+from csm.learning.export import load_module
+from csm.learning.module import CSMModule
 
 _log = logging.getLogger(__name__)
 

@@ -19,6 +19,7 @@ from csm.evaluation.provenance import provenance
 from csm.evaluation.report import add_rows
 from csm.evaluation.tables import markdown_table
 from csm.learning.callbacks import ValidationErrors
+from csm.learning.export import export_module
 from csm.learning.module import CSMModule
 
 
@@ -55,6 +56,7 @@ def fit(cfg: DictConfig, datamodule: CorrespondenceDataModule, folder: Path) -> 
     seconds = time.perf_counter() - begun
     checkpoint = folder / "model.ckpt"
     trainer.save_checkpoint(checkpoint)
+    export_module(module, folder / "export")
     print(f"trained for {seconds / 60:.1f} minutes: {checkpoint}")
     measured = {key: float(value) for key, value in trainer.callback_metrics.items()}
     return module, {"seconds": seconds, "checkpoint": str(checkpoint), **measured}

@@ -62,7 +62,7 @@ def linear_cross_entropy(
     if products not in ("float32", "bfloat16"):
         raise ValueError(f'products is "float32" or "bfloat16", got {products!r}')
     loss: Tensor = _LinearCrossEntropy.apply(  # type: ignore[no-untyped-call]
-        x, weight, bias, target, chunk, products == "bfloat16"
+        x, weight, bias, target, chunk, products == "bfloat16", torch.is_grad_enabled()
     )
     return loss
 
@@ -72,7 +72,14 @@ class _LinearCrossEntropy(torch.autograd.Function):
 
     @staticmethod
     def forward(
-        ctx: Any, x: Tensor, weight: Tensor, bias: Tensor, target: Tensor, chunk: int, low_precision: bool
+        ctx: Any,
+        x: Tensor,
+        weight: Tensor,
+        bias: Tensor,
+        target: Tensor,
+        chunk: int,
+        low_precision: bool,
+        learning: bool,
     ) -> Tensor:
         dtype = torch.bfloat16 if low_precision else x.dtype
         w, features = weight.to(dtype), x.to(dtype)
@@ -87,6 +94,8 @@ class _LinearCrossEntropy(torch.autograd.Function):
             p = z.exp_()
             norm = p.sum(1, keepdim=True)
             total += norm.log().sum()
+            if not learning:
+                continue
             p.div_(norm).scatter_add_(1, t, p.new_full(t.shape, -1.0))
             grad_b += p.sum(0)
             p = p.to(dtype)
@@ -100,4 +109,4 @@ class _LinearCrossEntropy(torch.autograd.Function):
     def backward(ctx: Any, *grad_outputs: Tensor) -> tuple[Tensor | None, ...]:
         scale = grad_outputs[0] / ctx.rows
         grad_x, grad_w, grad_b = ctx.saved_tensors
-        return grad_x * scale, grad_w * scale, grad_b * scale, None, None, None
+        return grad_x * scale, grad_w * scale, grad_b * scale, None, None, None, None

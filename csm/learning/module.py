@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any, Literal, cast
 
 import lightning as L
@@ -12,7 +11,7 @@ from torch.optim import Adam
 from torch.optim.lr_scheduler import CosineAnnealingLR, LRScheduler, OneCycleLR, StepLR
 
 from csm.data.datamodule import ShapeSample
-from csm.errors import ConfigError, CsmError, DataError
+from csm.errors import ConfigError
 from csm.learning.loss import Products, linear_cross_entropy
 from csm.networks import Basis, CorrespondenceNetwork, build
 
@@ -132,22 +131,3 @@ class CSMModule(L.LightningModule):
             case "one_cycle":
                 return OneCycleLR(optimizer, self.lr, total_steps=steps + 1)  # it is stepped once after the last step
         raise ConfigError(f"schedule is constant, cosine, step or one_cycle, got {self.schedule!r}")
-
-
-def load_module(path: Path) -> CSMModule:
-    """Load a checkpoint that `csm train` wrote; no config is needed and nothing in the file is executed.
-
-    Raises
-    ------
-    DataError
-        If there is no such file, or it is no checkpoint of csm.
-    """
-    if not path.is_file():
-        raise DataError(f"{path}: there is no such checkpoint; csm train writes model.ckpt into its output folder")
-    try:
-        return CSMModule.load_from_checkpoint(path, map_location="cpu", weights_only=True)
-    except CsmError:
-        raise
-    except Exception as error:  # a foreign file can trip the reader in any way
-        why = (str(error) or type(error).__name__).splitlines()[0]
-        raise DataError(f"{path}: not a checkpoint of csm ({why})") from error

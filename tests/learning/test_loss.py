@@ -77,3 +77,11 @@ def test_no_rows_is_an_error():
     _, weight, bias, _ = problem()
     with pytest.raises(ValueError, match="no rows"):
         linear_cross_entropy(torch.zeros(0, 5, dtype=torch.float64), weight, bias, torch.zeros(0, dtype=torch.long))
+
+
+def test_without_gradients_the_loss_is_the_same():
+    x, weight, bias, target = problem()
+    with torch.no_grad():
+        loss = linear_cross_entropy(x, weight, bias, target, chunk=10)
+    torch.testing.assert_close(loss, linear_cross_entropy(x, weight, bias, target).detach())
+    assert not loss.requires_grad

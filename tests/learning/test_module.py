@@ -8,7 +8,8 @@ from lightning import Trainer
 from csm.errors import ConfigError, DataError
 from csm.evaluation.matching import nearest
 from csm.learning.callbacks import ValidationErrors
-from csm.learning.module import CSMModule, load_module
+from csm.learning.export import load_module
+from csm.learning.module import CSMModule
 from tests.toyset import toy_datamodule
 
 NETWORK = {"name": "csmcnn", "channels": [16, 16, 16], "descriptor_channels": 24, "ks": 20, "terms": 4, "dropout": 0.0}

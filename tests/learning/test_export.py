@@ -1,0 +1,57 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+import torch
+
+from csm.errors import DataError
+from csm.learning.export import export_module, load_module
+from csm.learning.module import CSMModule
+from csm.networks import Basis
+from tests.learning.test_module import NETWORK
+
+
+@pytest.fixture
+def module() -> CSMModule:
+    torch.manual_seed(0)
+    return CSMModule(NETWORK, 7, 50, {"name": "hks", "k": 30, "n_times": 7, "scaled": True}, basis_k=24)
+
+
+def sample() -> tuple[torch.Tensor, Basis]:
+    g = torch.Generator().manual_seed(1)
+    evecs, _ = torch.linalg.qr(torch.randn(40, 24, generator=g))
+    return torch.randn(40, 7, generator=g), Basis(torch.arange(24.0), evecs, torch.ones(40))
+
+
+@pytest.mark.parametrize("classifier", [False, True])
+def test_an_export_gives_the_same_descriptor(module, tmp_path, classifier):
+    path = export_module(module, tmp_path / "out", classifier=classifier)
+    again = load_module(path)
+    torch.testing.assert_close(again.eval()(*sample()), module.eval()(*sample()), atol=0, rtol=0)
+    assert torch.equal(again.network.classifier.weight, module.network.classifier.weight) == classifier
+
+
+def test_an_export_is_json_and_safetensors_only(module, tmp_path):
+    path = export_module(module, tmp_path)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["model.json", "model.safetensors"]
+    assert json.loads(path.read_text())["descriptor"]["name"] == "hks"
+
+
+def test_faults_of_an_export_are_named(module, tmp_path):
+    path = export_module(module, tmp_path)
+    weights = tmp_path / "model.safetensors"
+    settings = json.loads(path.read_text())
+    path.write_text(json.dumps(settings | {"network": NETWORK | {"channels": [16, 16]}}))
+    with pytest.raises(DataError, match="another network"):
+        load_module(path)
+    path.write_text(json.dumps(settings))
+    weights.write_bytes(b"cut")
+    with pytest.raises(DataError, match=r"model\.safetensors: cannot be read"):
+        load_module(path)
+    weights.unlink()
+    with pytest.raises(DataError, match=r"model\.safetensors: cannot be read"):
+        load_module(path)
+    path.write_text("[1]")
+    with pytest.raises(DataError, match=r"model\.json: not a checkpoint"):
+        load_module(path)
