@@ -113,7 +113,7 @@ def chebyshev_block(spectrum: Spectrum, order: int) -> FloatArray:
     NumericalError
         If lambda_K is zero, because the mesh has K components or more.
     """
-    greatest = spectrum.evals[spectrum.n_zero :].max()
+    greatest = spectrum.evals[spectrum.n_zero() :].max()
     argument = 2 * spectrum.evals / greatest - 1
     weights: FloatArray = np.polynomial.chebyshev.chebvander(argument, order)
     return spectrum.evecs**2 @ weights

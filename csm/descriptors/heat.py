@@ -55,7 +55,7 @@ class HKS:
     def __call__(self, shape: Mesh | Operators) -> Features:
         """Return the descriptor of every vertex, (N, n_times), in units of 1/area."""
         spectrum = as_operators(shape).lbo(self.k)
-        times = heat_times(spectrum.evals[spectrum.n_zero], spectrum.evals[-1], self.n_times)
+        times = heat_times(spectrum.evals[spectrum.n_zero()], spectrum.evals[-1], self.n_times)
         return Features(
             heat_kernel_signature(spectrum.evals, spectrum.evecs, times, scaled=self.scaled),
             tuple(f"t={t:.3g}" for t in times),

@@ -63,7 +63,7 @@ class WKS:
     def __call__(self, shape: Mesh | Operators) -> Features:
         """Return the descriptor of every vertex, (N, n_energies), in units of 1/area."""
         spectrum = as_operators(shape).lbo(self.k)
-        zeros = spectrum.n_zero
+        zeros = spectrum.n_zero()
         band = wave_band(spectrum.evals[zeros], spectrum.evals[-1], self.n_energies, self.variant)
         kept = slice(0 if self.variant == "aubry" else zeros, None)
         values = wave_kernel_signature(spectrum.evals[kept], spectrum.evecs[:, kept], band)

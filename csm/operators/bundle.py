@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
+from scipy import sparse
 
 from csm._types import Arrays, FloatArray
 from csm.mesh.check import require_usable
@@ -96,7 +97,7 @@ class Operators:
 
         return self._spectrum("albo", params, solve)
 
-    def _solve(self, matrix: Any, k: int) -> Spectrum:
+    def _solve(self, matrix: sparse.csr_array, k: int) -> Spectrum:
         spectrum = eigenpairs(matrix, self.mass, k, name=self.mesh.name)
         flat = degenerate_faces(self.mesh)
         if flat.size == 0:

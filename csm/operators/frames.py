@@ -36,7 +36,8 @@ class FaceFrames:
         positive is convex.  The sign of the pair is meaningless, and so is that of every quantity linear in it.
     coherence
         Shape (M,), from 0 (the three corners disagree, or the face is flat or umbilic: the frame then follows the
-        face's longest edge) to 1 (they agree).
+        face's longest edge) to 1 (they agree).  Of the three lines, the difference of the eigenvalues of the sum of
+        u u^T over their sum; of the released vectors, the length of their mean.
 
     Notes
     -----

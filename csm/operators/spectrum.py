@@ -5,21 +5,16 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import ArpackError, LinearOperator, SuperLU, eigsh, splu
 from threadpoolctl import ThreadpoolController
 
 from csm._types import FloatArray
 from csm.errors import ConfigError, MeshError, NumericalError
+from csm.operators._eigensolver import Problem, attempt_once, attempts, residual
 
 _log = logging.getLogger(__name__)
-
-_DENSE_BELOW = 400  # vertices; smaller problems are solved densely
-_RESIDUAL = 1e-7
-_ORTHONORMAL = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +48,6 @@ class Spectrum:
             raise ConfigError(f"asked for the first {k} of {len(self.evals)} eigenpairs; compute more of them")
         return replace(self, evals=self.evals[:k], evecs=self.evecs[:, :k])
 
-    @property
     def n_zero(self) -> int:
         """Number of zero eigenvalues (below 1e-8 over the area): one per component of the mesh.
 
@@ -100,56 +94,17 @@ def eigenpairs(stiffness: sparse.csr_array, mass: FloatArray, k: int, *, name: s
     """
     _require_solvable(stiffness, mass, k, name)
     scale = 1.0 / np.sqrt(mass)
-    problem = _Problem(_symmetrised(stiffness, scale), k, unit=1.0 / mass.sum())
+    problem = Problem(_symmetrised(stiffness, scale), k, unit=1.0 / mass.sum())
     notes: list[str] = []
     with _blas().limit(limits=1):
-        for attempt in _attempts(problem):
-            found, fault = _try(problem, attempt)
+        for attempt in attempts(problem):
+            found, fault = attempt_once(problem, attempt)
             if found is not None:
                 evecs = _with_fixed_signs(scale[:, None] * found.evecs)
-                return Spectrum(np.maximum(found.evals, 0.0), evecs, mass, _residual(problem, found), tuple(notes))
+                return Spectrum(np.maximum(found.evals, 0.0), evecs, mass, residual(problem, found), tuple(notes))
             notes.append(f"{k} eigenpairs by {attempt.method}: {fault}")
             _log.warning("%s: %s", name, notes[-1])
     raise NumericalError(f"{name}: no attempt gave sound eigenpairs ({'; '.join(notes)}); run `csm check` on the mesh")
-
-
-class _Problem(NamedTuple):
-    matrix: sparse.csc_array  # symmetric, (N, N)
-    k: int
-    unit: float  # natural unit of its eigenvalues, 1 / area
-
-
-class _Attempt(NamedTuple):
-    method: str
-    shift: float
-    ncv: int
-
-
-class _Pairs(NamedTuple):
-    evals: FloatArray
-    evecs: FloatArray  # of the symmetric problem, orthonormal
-
-
-def _attempts(problem: _Problem) -> tuple[_Attempt, ...]:
-    n, k = problem.matrix.shape[0], problem.k
-    if n < _DENSE_BELOW or k > n // 3:
-        return (_Attempt("the dense solver", 0.0, 0),)
-    shift = -1e-2 * problem.unit
-    return (
-        _Attempt("shift-invert", shift, max(2 * k + 1, 20)),
-        _Attempt("shift-invert in a larger space", shift, min(4 * k + 20, n - 1)),
-        _Attempt("shift-invert with a larger shift", 100 * shift, min(6 * k + 20, n - 1)),
-    )
-
-
-def _try(problem: _Problem, attempt: _Attempt) -> tuple[_Pairs | None, str]:
-    """Return the pairs if they are sound, else None and what is wrong."""
-    try:
-        found = _solve(problem, attempt)
-        fault = _fault(problem, found)
-    except (ArpackError, RuntimeError, np.linalg.LinAlgError) as error:
-        return None, str(error)
-    return (None, fault) if fault else (found, "")
 
 
 @cache
@@ -178,53 +133,6 @@ def _symmetrised(stiffness: sparse.csr_array, scale: FloatArray) -> sparse.csc_a
     coo = stiffness.tocoo()
     data = coo.data * scale[coo.row] * scale[coo.col]
     return sparse.csc_array((data, (coo.row, coo.col)), shape=stiffness.shape)
-
-
-def _factor(symmetric: sparse.csc_array, shift: float) -> SuperLU:
-    """Factor  symmetric - shift I  with diagonal pivots: U's diagonal has a negative entry per eigenvalue below."""
-    shifted = sparse.csc_array(symmetric - shift * sparse.eye_array(symmetric.shape[0]))
-    return splu(shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-
-
-def _solve(problem: _Problem, attempt: _Attempt) -> _Pairs:
-    matrix, k = problem.matrix, problem.k
-    if attempt.ncv == 0:
-        evals, evecs = np.linalg.eigh(matrix.toarray())
-        return _Pairs(evals[:k], evecs[:, :k])
-    n = matrix.shape[0]
-    inverse = LinearOperator((n, n), matvec=_factor(matrix, attempt.shift).solve, dtype=np.float64)
-    start = np.random.default_rng(0).standard_normal(n)
-    evals, evecs = eigsh(matrix, k, sigma=attempt.shift, OPinv=inverse, v0=start, ncv=attempt.ncv)
-    order = np.argsort(evals)
-    return _Pairs(evals[order], evecs[:, order])
-
-
-def _fault(problem: _Problem, found: _Pairs) -> str:
-    """Return what is wrong with the pairs, or an empty string."""
-    residual = _residual(problem, found)
-    if not residual <= _RESIDUAL:
-        return f"the relative residual is {residual:.1e}, wanted at most {_RESIDUAL:.0e}"
-    error = np.abs(found.evecs.T @ found.evecs - np.eye(problem.k)).max()
-    if not error <= _ORTHONORMAL:
-        return f"the eigenvectors are orthonormal only to {error:.1e}"
-    missing = _missing(problem, found.evals)
-    return f"{missing} eigenvalues were passed over" if missing else ""
-
-
-def _residual(problem: _Problem, found: _Pairs) -> float:
-    defect = np.linalg.norm(problem.matrix @ found.evecs - found.evecs * found.evals, axis=0).max()
-    return float(defect / max(found.evals[-1], problem.unit))
-
-
-def _missing(problem: _Problem, evals: FloatArray) -> int:
-    """Count the eigenvalues that `evals` should contain and does not, up to its last clear gap."""
-    gaps = np.flatnonzero(np.diff(evals) > 1e-5 * max(evals[-1], problem.unit))
-    if gaps.size == 0:
-        return 0
-    last = gaps[-1]
-    bound = 0.5 * (evals[last] + evals[last + 1])
-    below = int((_factor(problem.matrix, bound).U.diagonal() < 0).sum())
-    return below - int(last + 1)
 
 
 def _with_fixed_signs(evecs: FloatArray) -> FloatArray:
