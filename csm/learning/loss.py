@@ -16,7 +16,7 @@ def linear_cross_entropy(
     bias: Tensor,
     target: Tensor,
     *,
-    chunk: int = 256,
+    chunk: int = 512,
     products: Products = "float32",
 ) -> Tensor:
     r"""Mean cross-entropy of the linear classifier ``x @ weight.T + bias``, computed in chunks of rows.
@@ -82,21 +82,18 @@ class _LinearCrossEntropy(torch.autograd.Function):
         learning: bool,
     ) -> Tensor:
         dtype = torch.bfloat16 if low_precision else x.dtype
-        w, features = weight.to(dtype), x.to(dtype)
+        w, b, features = weight.to(dtype), bias.to(dtype), x.to(dtype)
         grad_x, grad_w, grad_b = torch.empty_like(x), torch.zeros_like(weight), torch.zeros_like(bias)
         total = x.new_zeros(())
         for begin in range(0, len(x), chunk):
             rows = slice(begin, begin + chunk)
-            z = (features[rows] @ w.T).to(x.dtype).add_(bias)
             t = target[rows, None]
-            z.sub_(z.amax(1, keepdim=True))
-            total -= z.gather(1, t).sum()
-            p = z.exp_()
-            norm = p.sum(1, keepdim=True)
-            total += norm.log().sum()
+            log_p = torch.log_softmax(torch.addmm(b, features[rows], w.T), 1, dtype=x.dtype)
+            total -= log_p.gather(1, t).sum()
             if not learning:
                 continue
-            p.div_(norm).scatter_add_(1, t, p.new_full(t.shape, -1.0))
+            p = log_p.exp_()
+            p.scatter_add_(1, t, p.new_full(t.shape, -1.0))
             grad_b += p.sum(0)
             p = p.to(dtype)
             grad_x[rows] = (p @ w).to(x.dtype)
