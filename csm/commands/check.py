@@ -6,10 +6,15 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+from omegaconf import DictConfig
+
+from csm.commands.app import command
 from csm.data.folder import recognise
 from csm.data.folderset import FolderSet, Missing
 from csm.data.inspection import Inspected, inspect
+from csm.errors import ConfigError, DataError
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +41,18 @@ class Report:
         return "\n".join([*_table(self.rows), "", *_summary(self), *_what_is_missing(self.shapes.missing)])
 
 
-def run(folder: Path, progress: bool = True) -> Report:
+def run(cfg: DictConfig) -> dict[str, Any]:
+    """Check the folder of the configuration and print the table; DataError if a shape cannot be used."""
+    if cfg.folder is None:
+        raise ConfigError("check needs a folder of meshes: csm check FOLDER")
+    report = check_folder(Path(cfg.folder))
+    print(report)
+    if report.n_unusable:
+        raise DataError(f"{cfg.folder}: {report.n_unusable} of {len(report.rows)} shapes cannot be used, see the table")
+    return {"shapes": len(report.rows), "missing": len(report.shapes.missing)}
+
+
+def check_folder(folder: Path, progress: bool = True) -> Report:
     """Recognise a folder and check all its shapes; nothing is changed or downloaded.
 
     Raises
@@ -85,3 +101,9 @@ def _what_is_missing(missing: Sequence[Missing]) -> list[str]:
         lines += textwrap.wrap(names, 110, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)
         lines.append(f"  to be had from: {origin}")
     return lines
+
+
+main = command("check")(run)
+
+if __name__ == "__main__":
+    main()

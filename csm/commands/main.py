@@ -41,5 +41,12 @@ def main() -> None:
     if arguments[0] not in COMMANDS:
         print(f"csm: there is no command {arguments[0]!r}; csm --help lists them", file=sys.stderr)
         sys.exit(2)
-    sys.argv = [f"csm {arguments[0]}", *arguments[1:]]
+    sys.argv = [f"csm {arguments[0]}", *_named(*arguments)]
     importlib.import_module(f"csm.commands.{arguments[0]}").main()
+
+
+def _named(command: str, *arguments: str) -> list[str]:
+    """Let ``csm check FOLDER`` stand for ``csm check folder=FOLDER``."""
+    if command != "check":
+        return list(arguments)
+    return [a if "=" in a or a.startswith("-") else f"folder='{a}'" for a in arguments]

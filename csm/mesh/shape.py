@@ -76,7 +76,8 @@ class Mesh:
     @cached_property
     def face_areas(self) -> FloatArray:
         """Area of every triangle, shape (M,), in squared units of `vertices`."""
-        return 0.5 * np.linalg.norm(self.face_crosses, axis=1)
+        areas: FloatArray = 0.5 * np.linalg.norm(self.face_crosses, axis=1)
+        return areas
 
     @property
     def area(self) -> float:

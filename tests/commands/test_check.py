@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from csm.commands.check import run
+from csm.commands.check import check_folder
 from csm.mesh.io import write_mesh
 from csm.mesh.shape import Mesh
 from tests.data import layouts
@@ -11,7 +11,7 @@ from tests.shapes import sphere
 def test_table_has_a_row_per_shape_then_kind_and_what_is_missing(tmp_path):
     layouts.sga18(tmp_path)
     (tmp_path / "vtx_5k" / "corres" / "cat10.sym.vts").unlink()
-    report = run(tmp_path, progress=False)
+    report = check_folder(tmp_path, progress=False)
     lines = str(report).splitlines()
     assert lines[0].split() == ["shape", "vertices", "faces", "area", "findings"]
     assert [line.split()[0] for line in lines[1:4]] == ["cat0", "cat10", "dog0"]
@@ -27,7 +27,7 @@ def test_errors_and_notes_stand_in_the_row(tmp_path):
     ball = sphere(1)
     write_mesh(tmp_path / "a.off", Mesh(np.concatenate([ball.vertices, [[9, 9, 9]]]), ball.faces[1:]))
     (tmp_path / "b.off").write_text("nonsense")
-    report = run(tmp_path, progress=False)
+    report = check_folder(tmp_path, progress=False)
     a, b = str(report).splitlines()[1:3]
     assert "ERROR vertices in no face: 1 (42)" in a
     assert "boundary edges: 3" in a
@@ -38,7 +38,7 @@ def test_errors_and_notes_stand_in_the_row(tmp_path):
 
 @pytest.mark.data
 def test_a_real_set(data_set):
-    report = run(data_set("SHREC19_5k_remeshed"), progress=False)
+    report = check_folder(data_set("SHREC19_5k_remeshed"), progress=False)
     text = str(report)
     assert report.n_unusable == 0
     assert "44 shapes, 37 with correspondence" in text
