@@ -1,0 +1,187 @@
+"""Colours of vertices: by position, by side, by value; and their way across a map.
+
+Which way a map goes is in the name of the function.  A map is a vector with one entry per vertex of its *from* side
+that holds a vertex of its *to* side, or -1:
+
+- `pull_colors` paints the *from* side with colours of the *to* side (each vertex takes the colour of its image);
+- `push_colors` paints the *to* side with colours of the *from* side (vertices that nothing is mapped to stay grey).
+"""
+
+from __future__ import annotations
+
+from typing import Literal, TypeAlias
+
+import numpy as np
+from matplotlib import colormaps
+from numpy.typing import ArrayLike, NDArray
+
+from csm._types import BoolArray, FloatArray, IntArray
+from csm.errors import ConfigError
+from csm.mesh.shape import Mesh
+from csm.viewer.camera import Axis, body_axes
+from csm.viewer.shade import encoded
+
+Colors: TypeAlias = NDArray[np.uint8]
+
+UNMATCHED = (168, 168, 168)
+LEFT, RIGHT = (214, 96, 77), (67, 127, 180)
+ERROR_COLORMAP = "YlOrRd"
+_BINS = 32
+_GREY: Colors = np.array(UNMATCHED, dtype=np.uint8)
+
+# Björn Ottosson, "A perceptual color space for image processing" (Oklab), 2020: Oklab -> cube roots of LMS -> RGB.
+_LMS = np.array([[1, 0.3963377774, 0.2158037573], [1, -0.1055613458, -0.0638541728], [1, -0.0894841775, -1.2914855480]])
+_RGB = np.array(
+    [
+        [4.0767416621, -3.3077115913, 0.2309699292],
+        [-1.2684380046, 2.6097574011, -0.3413193965],
+        [-0.0041960863, -0.7034186147, 1.7076147010],
+    ]
+)
+
+
+def position_colors(mesh: Mesh, *, up: Axis | Literal["auto"] = "auto") -> Colors:
+    """Colour each vertex by where it is, so that neighbours look alike and left, right and the limbs differ.
+
+    Left to right runs from red to green and bottom to top from blue to yellow, by rank, so that a long arm does not
+    leave the torso without contrast; the back is darker than the front.
+
+    Parameters
+    ----------
+    mesh
+        N vertices.
+    up
+        Axis of the data that points up; see `View.up`.
+
+    Returns
+    -------
+    Colors
+        Shape (N, 3), uint8.
+    """
+    right, height, front = (2 * _spread(x) - 1 for x in body_axes(mesh, up) @ mesh.vertices.T)
+    lab = np.stack([0.70 + 0.05 * height + 0.07 * front, -0.19 * right, 0.17 * height], axis=1)
+    return _from_oklab(lab)
+
+
+def left_of(mesh: Mesh, *, up: Axis | Literal["auto"] = "auto") -> BoolArray:
+    """Return which vertices (N,) are on the shape's own left: the viewer's right in the front view.
+
+    The dividing plane goes through the middle of the shape, so this suits a symmetric pose.
+    """
+    right = mesh.vertices @ body_axes(mesh, up)[0]
+    return np.asarray(right > 0.5 * (right.min() + right.max()))
+
+
+def two_tone(left: BoolArray) -> Colors:
+    """Colour vertices (N,) red on the left and blue on the right; carried over a map, this shows left-right flips."""
+    return np.where(np.asarray(left)[:, None], np.array(LEFT, np.uint8), np.array(RIGHT, np.uint8))
+
+
+def scalar_colors(
+    values: ArrayLike, low: float | None = None, high: float | None = None, colormap: str = "viridis"
+) -> Colors:
+    """Colour values (N,) by a matplotlib colour map; values that are not finite become grey.
+
+    Parameters
+    ----------
+    values
+        Shape (N,).
+    low, high
+        Values of the first and last colour; the least and greatest finite value by default.
+    colormap
+        Name of a matplotlib colour map; the default and `ERROR_COLORMAP` are monotone in lightness.
+
+    Raises
+    ------
+    ConfigError
+        If there is no such colour map.
+    """
+    if colormap not in colormaps:
+        raise ConfigError(f"{colormap!r} is not a colour map of matplotlib; try viridis, cividis or {ERROR_COLORMAP}")
+    given = np.asarray(values, dtype=np.float64)
+    finite = np.isfinite(given)
+    known = given[finite] if finite.any() else np.zeros(1)
+    first, last = known.min() if low is None else low, known.max() if high is None else high
+    fraction = np.clip((np.where(finite, given, first) - first) / max(last - first, 1e-300), 0, 1)
+    colors: Colors = colormaps[colormap](fraction, bytes=True)[:, :3]
+    return np.where(finite[:, None], colors, _GREY)
+
+
+def pull_colors(to_colors: ArrayLike, indices: IntArray) -> Colors:
+    """Paint the from side: each vertex takes the colour of the vertex that it is mapped to, grey without one.
+
+    Parameters
+    ----------
+    to_colors
+        Shape (n_to, 3), uint8.
+    indices
+        Shape (n_from,), the map: vertices of the to side, or -1.
+
+    Returns
+    -------
+    Colors
+        Shape (n_from, 3), uint8.
+
+    Raises
+    ------
+    ConfigError
+        If the map refers to a vertex that has no colour.
+    """
+    colors, indices = np.asarray(to_colors, dtype=np.uint8), np.asarray(indices)
+    _require_map(indices, len(colors))
+    return np.where(indices[:, None] >= 0, colors[indices], _GREY)
+
+
+def push_colors(from_colors: ArrayLike, indices: IntArray, n_to: int) -> Colors:
+    """Paint the to side: each vertex takes the colour of the first vertex that is mapped to it, grey without one.
+
+    Parameters
+    ----------
+    from_colors
+        Shape (n_from, 3), uint8.
+    indices
+        Shape (n_from,), the map: vertices of the to side, or -1.
+    n_to
+        Number of vertices of the to side.
+
+    Returns
+    -------
+    Colors
+        Shape (n_to, 3), uint8.
+
+    Raises
+    ------
+    ConfigError
+        If there is not one colour per entry of the map or the map leaves 0..n_to-1.
+    """
+    colors, indices = np.asarray(from_colors, dtype=np.uint8), np.asarray(indices)
+    _require_map(indices, n_to)
+    if colors.shape != (len(indices), 3):
+        raise ConfigError(f"colours have shape {colors.shape}, wanted ({len(indices)}, 3): one per entry of the map")
+    painted = np.tile(_GREY, (n_to, 1))
+    reached, first = np.unique(indices, return_index=True)
+    painted[reached[reached >= 0]] = colors[first[reached >= 0]]
+    return painted
+
+
+def _require_map(indices: IntArray, n_to: int) -> None:
+    if indices.ndim != 1 or indices.dtype.kind not in "iu":
+        raise ConfigError(f"a map is {indices.dtype} of shape {indices.shape}, wanted a vector of vertex numbers")
+    if indices.min(initial=-1) < -1 or indices.max(initial=-1) >= n_to:
+        bad = int(np.flatnonzero((indices < -1) | (indices >= n_to))[0])
+        raise ConfigError(f"a map sends vertex {bad} to {indices[bad]}, wanted 0..{n_to - 1}, or -1 for no counterpart")
+
+
+def _spread(x: FloatArray) -> FloatArray:
+    """Map values to 0..1, half by size and half by rank; the rank is read off a coarse histogram, hence smooth."""
+    low, high = float(x.min()), float(x.max())
+    grid = np.linspace(low, high + 1e-12 * max(abs(low), abs(high), 1e-300), _BINS + 1)
+    rank = np.searchsorted(np.sort(x), grid) / len(x)
+    size = (x - low) / max(high - low, 1e-300)
+    spread: FloatArray = 0.5 * size + 0.5 * np.interp(x, grid, rank)
+    return spread
+
+
+def _from_oklab(lab: FloatArray) -> Colors:
+    rgb = (lab @ _LMS.T) ** 3 @ _RGB.T
+    return np.round(encoded(rgb) * 255).astype(np.uint8)

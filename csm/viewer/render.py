@@ -1,0 +1,144 @@
+"""Pictures of meshes without a display or graphics card, the same bytes every time.
+
+A picture is made in two passes over a supersampled grid of pixels: the first finds the triangle nearest to the viewer
+(`raster`), the second interpolates normal and colour inside that triangle and lights it (`shade`).
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from csm._types import BoolArray, Float32Array, FloatArray
+from csm.errors import ConfigError, MeshError
+from csm.mesh.shape import Mesh
+from csm.viewer.camera import View, project, rotation
+from csm.viewer.picture import Picture, contact_sheet, save_png
+from csm.viewer.raster import fragments_at, interpolate, visible_faces
+from csm.viewer.shade import creases, edge_ink, encoded, light, linear
+
+__all__ = ["Picture", "View", "as_colors", "contact_sheet", "render", "save_png", "vertex_normals"]
+
+DEFAULT_COLOR = (196, 203, 214)
+
+
+def render(
+    mesh: Mesh,
+    colors: ArrayLike | None = None,
+    *,
+    size: tuple[int, int] = (600, 800),
+    view: View | None = None,
+    background: Literal["white", "transparent"] = "white",
+    lighting: bool = True,
+    wireframe: bool = False,
+    supersample: int = 2,
+) -> Picture:
+    """Draw a mesh.
+
+    Parameters
+    ----------
+    mesh
+        N vertices, M faces; both sides of a face are drawn.
+    colors
+        One colour (3,) or one per vertex (N, 3): uint8, or floats from 0 to 1; a light grey by default.
+    size
+        Width and height in pixels.
+    view
+        Where the viewer stands; `View()` by default, which looks at a y-up body from the front.
+    background
+        "white" gives three channels, "transparent" four with straight (not premultiplied) alpha.
+    lighting
+        False paints the plain colours, so that they can be read off exactly.
+    wireframe
+        Draw the edges of the triangles.
+    supersample
+        Samples per pixel along each axis; 2 is quick, 4 is for print.
+
+    Returns
+    -------
+    Picture
+        Shape (height, width, 3 or 4), uint8, sRGB, first row at the top.
+
+    Raises
+    ------
+    MeshError
+        If the mesh has no face or a coordinate is not finite.
+    ConfigError
+        If the colours or another option cannot be used.
+    """
+    _require_drawable(mesh, size, supersample, background)
+    vertex_colors = linear(as_colors(colors, mesh.n_vertices)).astype(np.float32)
+    view = view or View()
+    width, height = size[0] * supersample, size[1] * supersample
+    triangles = project(mesh, view, width, height)[mesh.faces]
+    nearest = visible_faces(triangles, width, height)
+    covered = np.flatnonzero(nearest >= 0)
+    seen = fragments_at(triangles, nearest, covered, width)
+    corners = mesh.faces[seen.face]
+    surface = interpolate(seen.weights, vertex_colors, corners)
+    if lighting:
+        normals = (vertex_normals(mesh) @ rotation(mesh, view).T).astype(np.float32)
+        dark = creases(seen.depth, covered, (height, width))
+        surface = light(surface, interpolate(seen.weights, normals, corners), dark)
+    if wireframe:
+        surface *= edge_ink(triangles, seen, half_width=0.5 * supersample)[:, None]
+    premultiplied = np.zeros((height * width, 3), dtype=np.float32)
+    premultiplied[covered] = surface
+    return _finish(premultiplied, nearest >= 0, size, supersample, background)
+
+
+def vertex_normals(mesh: Mesh) -> FloatArray:
+    """Unit normal per vertex, the area-weighted mean of its faces' normals; shape (N, 3), zero where it has no face."""
+    corner = mesh.faces.ravel()
+    sums = [np.bincount(corner, np.repeat(mesh.face_crosses[:, k], 3), mesh.n_vertices) for k in range(3)]
+    total = np.stack(sums, axis=1)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    unit: FloatArray = np.divide(total, length, out=np.zeros_like(total), where=length > 0)
+    return unit
+
+
+def as_colors(colors: ArrayLike | None, n: int) -> FloatArray:
+    """Return colours as floats from 0 to 1, shape (n, 3), from uint8 or floats, one for all or one for each.
+
+    Raises
+    ------
+    ConfigError
+        If the shape is neither (3,) nor (n, 3), integers are not in 0..255, or floats are not in 0..1.
+    """
+    given: NDArray[Any] = np.asarray(DEFAULT_COLOR if colors is None else colors)
+    if given.shape not in ((3,), (n, 3)):
+        raise ConfigError(
+            f"colours have shape {given.shape}, wanted (3,) or ({n}, 3): one RGB colour or one per vertex"
+        )
+    values = given / 255.0 if np.issubdtype(given.dtype, np.integer) else given.astype(np.float64)
+    if not (np.isfinite(values).all() and values.min(initial=0) >= 0 and values.max(initial=0) <= 1):
+        raise ConfigError("colours leave their range: wanted integers from 0 to 255 or floats from 0 to 1")
+    return np.broadcast_to(values, (n, 3))
+
+
+def _require_drawable(mesh: Mesh, size: tuple[int, int], supersample: int, background: str) -> None:
+    if mesh.n_faces == 0:
+        raise MeshError(f"{mesh.name}: there are no faces to draw")
+    finite = np.isfinite(mesh.vertices).all(axis=1)
+    if not finite.all():
+        bad = int(np.argmin(finite))
+        raise MeshError(f"{mesh.name}: vertex {bad} is not finite, so the shape cannot be drawn; run `csm check`")
+    if min(size) < 1 or supersample < 1:
+        raise ConfigError(f"picture of {size[0]} x {size[1]} pixels with {supersample} samples: all must be 1 or more")
+    if background not in ("white", "transparent"):
+        raise ConfigError(f"background is {background!r}, wanted white or transparent")
+
+
+def _finish(
+    premultiplied: Float32Array, covered: BoolArray, size: tuple[int, int], samples: int, background: str
+) -> Picture:
+    """Average the samples of each pixel in linear light and encode them."""
+    grid = (size[1], samples, size[0], samples)
+    alpha = covered.reshape(grid).mean(axis=(1, 3), dtype=np.float32)[..., None]
+    color = premultiplied.reshape(*grid, 3).mean(axis=(1, 3))
+    if background == "white":
+        return np.round(encoded(color + (1 - alpha)) * 255).astype(np.uint8)
+    straight = encoded(color / np.maximum(alpha, 1e-6))
+    return np.round(np.concatenate([straight, alpha], axis=-1) * 255).astype(np.uint8)
