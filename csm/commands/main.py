@@ -46,7 +46,8 @@ def main() -> None:
 
 
 def _named(command: str, *arguments: str) -> list[str]:
-    """Let ``csm check FOLDER`` stand for ``csm check folder=FOLDER``."""
-    if command != "check":
+    """Let ``csm check FOLDER ...`` stand for ``csm check folder=FOLDER ...``."""
+    first, *others = arguments or ("",)
+    if command != "check" or not first or "=" in first or first.startswith("-"):
         return list(arguments)
-    return [a if "=" in a or a.startswith("-") else f"folder='{a}'" for a in arguments]
+    return [f"folder='{first}'", *others]
