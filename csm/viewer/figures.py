@@ -1,0 +1,270 @@
+"""Figures for papers, reports and TensorBoard: matplotlib `Figure` objects without a display or global state."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike, NDArray
+from PIL import Image
+
+from csm._types import FloatArray, IntArray
+from csm.errors import ConfigError
+from csm.evaluation.results import Evaluation
+from csm.mesh.io import atomic_path
+from csm.mesh.shape import Mesh
+from csm.viewer.camera import View
+from csm.viewer.colors import ERROR_COLORMAP, position_colors, pull_colors, scalar_colors
+from csm.viewer.picture import Picture
+from csm.viewer.render import render
+
+# Okabe and Ito, "Color universal design", 2008: told apart by people with any colour vision; yellow is left out.
+CYCLE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
+_DASHES = ("-", "--", "-.", ":")
+_NORMALISERS = {"diameter": "fraction of the geodesic diameter", "sqrt_area": "fraction of the square root of the area"}
+# Dates would make two runs differ; an entry of None leaves matplotlib's own out.
+_UNDATED: Mapping[str, dict[str, str | None]] = {
+    ".png": {"Software": None},
+    ".pdf": {"CreationDate": None},
+    ".svg": {"Date": None},
+}
+
+
+class Curve(NamedTuple):
+    """A CQC curve known only by its points, such as a published one."""
+
+    thresholds: FloatArray
+    """(T,) errors, as fractions of the normaliser."""
+    cqc: FloatArray
+    """(T,) fractions of matches with at most this error."""
+    age: float
+    """Mean error."""
+
+
+Curves: TypeAlias = Mapping[str, Evaluation | Curve | tuple[FloatArray, FloatArray, float]]
+
+
+def cqc_figure(curves: Curves, *, normaliser: str = "diameter", limit: float | None = None) -> Figure:
+    """Plot the fraction of matches within an error, one curve per method, with the mean error (AGE) in the legend.
+
+    Parameters
+    ----------
+    curves
+        Name of the method -> its evaluation, or (thresholds (T,), cqc (T,), age).
+    normaliser
+        What the errors of bare curves are fractions of: "diameter" or "sqrt_area".
+    limit
+        Largest error shown; the largest threshold by default.
+
+    Raises
+    ------
+    ConfigError
+        If there is no curve, or curves are in different normalisers.
+    """
+    found = {c.protocol.normaliser if isinstance(c, Evaluation) else normaliser for c in curves.values()}
+    if len(found) != 1:
+        raise ConfigError(f"cqc figure: {len(curves)} curves in {len(found)} normalisers; wanted some curves in one")
+    figure, axes = _figure(5.2, 3.9)
+    for k, (name, given) in enumerate(curves.items()):
+        curve = Curve(given.thresholds, given.cqc, given.summary["age"]) if isinstance(given, Evaluation) else given
+        thresholds, fractions, age = curve
+        axes.plot(thresholds, 100 * fractions, label=f"{name} (AGE {1000 * age:.1f})", **_line(k))
+    last = max(float(line.get_xdata()[-1]) for line in axes.get_lines())  # type: ignore[index, arg-type]
+    axes.set_xlim(0, last if limit is None else limit)
+    axes.set_ylim(0, 100)
+    axes.set_xlabel(_error_label(found.pop()))
+    axes.set_ylabel("matches within the error (%)")
+    axes.legend(loc="lower right", frameon=False, title="AGE in thousandths", alignment="left")
+    return figure
+
+
+def error_histogram(errors: Mapping[str, FloatArray], *, normaliser: str = "diameter", bins: int = 60) -> Figure:
+    """Plot how errors (P,) are distributed, one outline per method, on a logarithmic scale of frequency.
+
+    Exact matches would hide all else, so they are counted in the legend and not drawn.
+
+    Raises
+    ------
+    ConfigError
+        If a method has no error.
+    """
+    if not errors or any(np.size(e) == 0 for e in errors.values()):
+        raise ConfigError(f"error histogram: wanted errors of at least one method, got {list(errors)}")
+    figure, axes = _figure(5.2, 3.6)
+    edges = np.linspace(0, max(float(np.max(e)) for e in errors.values()) or 1.0, bins + 1)
+    for k, (name, values) in enumerate(errors.items()):
+        counts, _ = np.histogram(values[values > 0], edges)
+        exact = 100 * float(np.mean(values == 0))
+        axes.stairs(100 * counts / len(values), edges, label=f"{name} ({exact:.1f} % exact)", **_line(k))
+    axes.set_yscale("log")
+    axes.set_xlim(0, edges[-1])
+    axes.set_xlabel(_error_label(normaliser))
+    axes.set_ylabel("matches per bin (%)")
+    axes.legend(frameon=False)
+    return figure
+
+
+def filters_figure(evals: ArrayLike, responses: Mapping[str, NDArray[np.floating]]) -> Figure:
+    """Plot learned spectral filters over the eigenvalues, one panel per layer.
+
+    Parameters
+    ----------
+    evals
+        Shape (K,), of the Laplacian; 1 / area.
+    responses
+        Name of the layer -> its filters, shape (K, ...): all that follows K are separate filters, such as input and
+        output channels.  All are drawn, so choose a subset of a wide layer.  The heavy line is their root mean square.
+
+    Raises
+    ------
+    ConfigError
+        If there is no layer, or a layer does not have K responses.
+    """
+    x = np.asarray(evals, dtype=np.float64)
+    wrong = [name for name, r in responses.items() if r.ndim < 2 or r.shape[0] != len(x)]
+    if not responses or wrong:
+        raise ConfigError(f"filters figure: layers {wrong or 'none'}; wanted layers of shape ({len(x)}, ...)")
+    figure = Figure(figsize=(3.4 * len(responses), 3.1), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(1, len(responses), sharex=True, squeeze=False)[0]
+    for axes, (name, given) in zip(panels, responses.items(), strict=True):
+        filters = np.asarray(given, dtype=np.float64).reshape(len(x), -1)
+        lines = [np.column_stack([x, column]) for column in filters.T]
+        strength = max(0.1, min(0.6, 15 / len(lines)))
+        axes.add_collection(LineCollection(lines, colors=CYCLE[0], linewidths=0.8, alpha=strength))
+        axes.plot(x, np.sqrt((filters**2).mean(axis=1)), color=CYCLE[1], linewidth=2, label="root mean square")
+        axes.autoscale_view()
+        axes.set_title(f"{name}: {len(lines)} filters", fontsize=10)
+        axes.set_xlabel("eigenvalue λ (1 / area)")
+        _plain(axes)
+    panels[0].set_ylabel("response")
+    panels[0].legend(frameon=False, fontsize=8)
+    return figure
+
+
+def correspondence_figure(
+    source: Mesh,
+    target: Mesh,
+    indices: IntArray,
+    errors: FloatArray | None = None,
+    *,
+    view: View | None = None,
+    normaliser: str = "diameter",
+    size: tuple[int, int] = (380, 560),
+) -> Figure:
+    """Draw a map by transferred colours, and its errors where they are known.
+
+    The target is coloured by position; each vertex of the source has the colour of the vertex that it is mapped to,
+    and grey if it has none.  The error of a vertex is drawn on the source.
+
+    Parameters
+    ----------
+    source, target
+        N_s and N_t vertices.
+    indices
+        Shape (N_s,), the vertex of the target for each vertex of the source, or -1.
+    errors
+        Shape (N_s,), as fractions of the normaliser, NaN where unknown (grey); the scale ends at their 99th percentile.
+    view
+        Where the viewer stands; from the front, with the longest axis up, by default.
+    normaliser
+        "diameter" or "sqrt_area", for the label.
+    size
+        Width and height in pixels of each of the two or three drawings.
+
+    Raises
+    ------
+    ConfigError
+        If the map or the errors do not fit the shapes.
+    """
+    for what, given in (("map", indices), ("errors", errors)):
+        if given is not None and given.shape != (source.n_vertices,):
+            raise ConfigError(
+                f"{source.name} -> {target.name}: the {what} has shape {given.shape}; "
+                f"wanted one entry for each of the {source.n_vertices} vertices of the source"
+            )
+    view = view or View(up="auto")
+    reference = position_colors(target, up=view.up)
+    drawn = [
+        (f"source {source.name}, colours of its matches", source, pull_colors(reference, indices)),
+        (f"target {target.name}, coloured by position", target, reference),
+    ]
+    if errors is not None:
+        high = _high(errors)
+        drawn.append((f"error on {source.name}", source, scalar_colors(errors, 0.0, high, ERROR_COLORMAP)))
+    dpi = 150
+    figure = Figure(figsize=(len(drawn) * size[0] / dpi + 0.9, size[1] / dpi + 0.4), dpi=dpi, layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(1, len(drawn), squeeze=False)[0]
+    for axes, (title, mesh, colors) in zip(panels, drawn, strict=True):
+        axes.imshow(render(mesh, colors, size=size, view=view), interpolation="antialiased")
+        axes.set_title(title, fontsize=7)
+        axes.set_axis_off()
+    if errors is not None:
+        scale = ScalarMappable(Normalize(0, high), ERROR_COLORMAP)
+        bar = figure.colorbar(scale, ax=panels[-1], shrink=0.7, extend="max")
+        bar.set_label(_error_label(normaliser), fontsize=7)
+        bar.ax.tick_params(labelsize=7)
+    return figure
+
+
+def figure_to_array(figure: Figure, dpi: float = 150) -> Picture:
+    """Draw a figure into pixels, shape (H, W, 3)."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=dpi)
+    return np.array(Image.open(buffer).convert("RGB"))
+
+
+def save_figure(path: str | os.PathLike[str], figure: Figure, dpi: float = 200) -> None:
+    """Write a figure as .png, .pdf or .svg; the file is there whole or not at all.
+
+    Raises
+    ------
+    ConfigError
+        If the name ends otherwise.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in _UNDATED:
+        raise ConfigError(f"{path}: figures are written as {', '.join(_UNDATED)}; choose one of these endings")
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, dpi=dpi, metadata=_UNDATED[suffix])
+
+
+def _figure(width: float, height: float) -> tuple[Figure, Axes]:
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots()
+    _plain(axes)
+    return figure, axes
+
+
+def _plain(axes: Axes) -> None:
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(color="0.9", linewidth=0.8)
+    axes.set_axisbelow(True)
+
+
+def _line(k: int) -> dict[str, Any]:
+    dash = _DASHES[k // len(CYCLE) % len(_DASHES)]
+    return {"color": CYCLE[k % len(CYCLE)], "linestyle": dash, "linewidth": 1.8}
+
+
+def _error_label(normaliser: str) -> str:
+    if normaliser not in _NORMALISERS:
+        raise ConfigError(f"normaliser={normaliser!r} is unknown; choose one of {', '.join(_NORMALISERS)}")
+    return f"geodesic error ({_NORMALISERS[normaliser]})"
+
+
+def _high(errors: FloatArray) -> float:
+    known = errors[np.isfinite(errors)]
+    return float(np.percentile(known, 99)) or 1e-3 if known.size else 1e-3

@@ -1,0 +1,140 @@
+"""Figures say what their axes are, show the numbers they were given and are the same every time."""
+
+from __future__ import annotations
+
+import runpy
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from PIL import Image
+
+from csm.data.shapeset import Shape
+from csm.errors import ConfigError
+from csm.evaluation.protocol import Protocol, evaluate_matches
+from csm.mesh.correspondence import PointMap
+from csm.mesh.shape import Mesh
+from csm.viewer import figures
+from csm.viewer.camera import View
+from csm.viewer.colors import position_colors, pull_colors
+from csm.viewer.figures import (
+    Curve,
+    correspondence_figure,
+    cqc_figure,
+    error_histogram,
+    figure_to_array,
+    filters_figure,
+    save_figure,
+)
+from csm.viewer.render import render
+from tests.shapes import blob
+
+T = np.linspace(0, 0.25, 11)
+SMALL = (60, 80)
+
+
+def legend(figure: Figure) -> list[str]:
+    return [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+
+
+def test_cqc_shows_every_method_with_its_mean_error() -> None:
+    figure = cqc_figure({"ours": Curve(T, np.sqrt(T / 0.25), 0.0104), "theirs": (T, T / 0.25, 0.077)})
+    axes = figure.axes[0]
+    assert legend(figure) == ["ours (AGE 10.4)", "theirs (AGE 77.0)"]
+    np.testing.assert_allclose(axes.get_lines()[1].get_ydata(), 100 * T / 0.25)
+    assert "fraction of the geodesic diameter" in axes.get_xlabel()
+    assert "%" in axes.get_ylabel()
+    assert axes.get_xlim() == (0, 0.25)
+
+
+def test_cqc_of_an_evaluation_takes_its_normaliser() -> None:
+    mesh = blob(1)
+    shapes = [Shape(Mesh(mesh.vertices, mesh.faces, name), PointMap.identity(mesh.n_vertices)) for name in "ab"]
+    protocol = Protocol(distance="edge", normaliser="sqrt_area")
+    result = evaluate_matches(shapes, lambda s, t: np.arange(mesh.n_vertices), protocol, progress=False)
+    figure = cqc_figure({"identity": result})
+    assert "square root of the area" in figure.axes[0].get_xlabel()
+    assert legend(figure) == ["identity (AGE 0.0)"]
+    with pytest.raises(ConfigError, match="2 normalisers"):
+        cqc_figure({"identity": result, "bare": Curve(T, T, 0.1)})
+
+
+def test_histogram_counts_all_that_is_not_exact() -> None:
+    errors = np.array([0.0, 0.0, 0.0, 0.1, 0.2, 0.2, 0.3, 0.4])
+    figure = error_histogram({"ours": errors}, bins=4)
+    stairs = figure.axes[0].patches[0].get_data()
+    assert stairs.values.sum() == pytest.approx(100 * 5 / 8)
+    assert legend(figure) == ["ours (37.5 % exact)"]
+    assert "geodesic error" in figure.axes[0].get_xlabel()
+    assert figure.axes[0].get_ylabel()
+
+
+def test_filters_have_a_panel_per_layer_and_a_line_per_filter() -> None:
+    evals = np.linspace(0, 100, 16)
+    wide = np.random.default_rng(0).normal(size=(16, 3, 5))
+    figure = filters_figure(evals, {"conv1": wide, "conv2": wide[:, :1]})
+    assert [a.get_title() for a in figure.axes] == ["conv1: 15 filters", "conv2: 5 filters"]
+    for axes, count in zip(figure.axes, (15, 5), strict=True):
+        (lines,) = (c for c in axes.collections if isinstance(c, LineCollection))
+        assert len(lines.get_segments()) == count
+        assert "eigenvalue" in axes.get_xlabel()
+    rms = figure.axes[0].get_lines()[0].get_ydata()
+    np.testing.assert_allclose(rms, np.sqrt((wide**2).mean(axis=(1, 2))))
+
+
+def test_correspondence_draws_source_target_and_errors() -> None:
+    mesh = blob(3)
+    flipped = np.random.default_rng(0).permutation(mesh.n_vertices)
+    errors = np.linspace(0, 0.1, mesh.n_vertices)
+    errors[:5] = np.nan
+    figure = correspondence_figure(mesh, mesh, flipped, errors, size=SMALL)
+    source, target, error, bar = figure.axes
+    colors, view = position_colors(mesh), View(up="auto")
+    np.testing.assert_array_equal(target.images[0].get_array(), render(mesh, colors, size=SMALL, view=view))
+    np.testing.assert_array_equal(
+        source.images[0].get_array(), render(mesh, pull_colors(colors, flipped), size=SMALL, view=view)
+    )
+    assert error.images[0].get_array().shape == (80, 60, 3)
+    assert "geodesic error" in bar.get_ylabel()
+    assert bar.get_ylim()[1] == pytest.approx(np.nanpercentile(errors, 99))
+    assert len(correspondence_figure(mesh, mesh, flipped, size=SMALL).axes) == 2
+
+
+def test_what_does_not_fit_is_refused() -> None:
+    mesh = blob(1)
+    with pytest.raises(ConfigError, match="one entry for each"):
+        correspondence_figure(mesh, mesh, np.arange(3))
+    with pytest.raises(ConfigError, match="0 curves"):
+        cqc_figure({})
+    with pytest.raises(ConfigError, match="at least one method"):
+        error_histogram({"ours": np.array([])})
+    with pytest.raises(ConfigError, match="conv2"):
+        filters_figure(np.arange(4), {"conv1": np.zeros((4, 2)), "conv2": np.zeros((5, 2))})
+    with pytest.raises(ConfigError, match="normaliser='mile'"):
+        error_histogram({"ours": np.ones(3)}, normaliser="mile")
+
+
+def test_pixels_of_a_figure_are_those_of_its_file(tmp_path: Path) -> None:
+    figure = cqc_figure({"ours": Curve(T, T / 0.25, 0.1)})
+    picture = figure_to_array(figure, dpi=60)
+    assert picture.dtype == np.uint8
+    save_figure(tmp_path / "a.png", figure, dpi=60)
+    np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "a.png").convert("RGB")), picture)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".pdf"])
+def test_files_are_the_same_every_time(tmp_path: Path, suffix: str) -> None:
+    for name in "ab":
+        save_figure(tmp_path / f"{name}{suffix}", cqc_figure({"ours": Curve(T, T / 0.25, 0.1)}), dpi=60)
+    assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
+    with pytest.raises(ConfigError, match=r"\.docx"):
+        save_figure(tmp_path / "a.docx", Figure())
+
+
+def test_pyplot_and_its_global_state_are_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)  # importing it now fails
+    module = runpy.run_path(figures.__file__)
+    assert module["error_histogram"]({"ours": np.ones(3)}).axes
