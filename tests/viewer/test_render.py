@@ -7,9 +7,9 @@ import pytest
 
 from csm.errors import ConfigError, MeshError
 from csm.mesh.shape import Mesh
-from csm.viewer.camera import View, guess_up, rotation
+from csm.viewer.camera import View
 from csm.viewer.render import as_colors, render, vertex_normals
-from tests.shapes import cylinder, sphere
+from tests.shapes import sphere
 
 FLAT = View(elevation=0)
 RED, BLUE = (255, 0, 0), (0, 0, 255)
@@ -70,17 +70,6 @@ def test_up_and_right_of_the_data_are_up_and_right_of_the_picture() -> None:
     assert np.unravel_index(gray.argmax(), gray.shape) == (0, 0)
 
 
-@pytest.mark.parametrize("up", ["x", "y", "z"])
-@pytest.mark.parametrize("azimuth", [0, 37, 200])
-def test_views_are_proper_rotations_that_keep_up(up: str, azimuth: float) -> None:
-    axes = rotation(sphere(1), View(up=up, azimuth=azimuth, elevation=15))
-    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
-    assert np.linalg.det(axes) == pytest.approx(1)
-    k = "xyz".index(up)
-    assert axes[0, k] == pytest.approx(0, abs=1e-12)
-    assert axes[1, k] == pytest.approx(np.cos(np.radians(15)))
-
-
 def test_white_background_is_white_and_transparent_is_clear() -> None:
     white = render(sphere(2), size=(40, 40))
     clear = render(sphere(2), size=(40, 40), background="transparent")
@@ -126,10 +115,6 @@ def test_vertex_normals_of_a_sphere_point_outwards() -> None:
     assert (vertex_normals(mesh) * mesh.vertices).sum(axis=1).min() > 0.999
 
 
-def test_longest_axis_is_up() -> None:
-    assert guess_up(cylinder()) == "z"
-
-
 def test_colours_are_taken_as_bytes_or_fractions() -> None:
     np.testing.assert_array_equal(as_colors([255, 0, 51], 2), [[1, 0, 0.2]] * 2)
     np.testing.assert_array_equal(as_colors(np.eye(3), 3), np.eye(3))
@@ -148,9 +133,5 @@ def test_undrawable_meshes_and_options_are_refused() -> None:
         render(Mesh([[0, 0, 0], [np.nan, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
     with pytest.raises(ConfigError, match="background"):
         render(sphere(1), background="black")
-    with pytest.raises(ConfigError, match="up"):
-        View(up="w")
-    with pytest.raises(ConfigError, match="height"):
-        View(height=0.0)
     with pytest.raises(ConfigError, match="1 or more"):
         render(sphere(1), size=(0, 10))
