@@ -36,7 +36,7 @@ class Subject:
 class Humans(Sequence[Mesh]):
     """A sequence of the built-in shapes that decodes a mesh when it is asked for.
 
-    Shape number 10 s + p is person s in pose p, named "s{s:02d}_p{p:02d}" as in "s03_p07"; units are metres, z points up.
+    Shape number 10 s + p is person s in pose p, named as in "s03_p07"; units are metres, z points up.
     Vertex i is the same point of the body in every shape.
 
     Parameters
@@ -114,7 +114,8 @@ class Humans(Sequence[Mesh]):
 
     def _vertices(self, index: int) -> FloatArray:
         levels = np.cumsum(self.arrays["differences"][index], axis=0, dtype=np.uint16)
-        return self.arrays["offset"][index] + self.arrays["step"][index] * levels
+        vertices: FloatArray = self.arrays["offset"][index] + self.arrays["step"][index] * levels
+        return vertices
 
 
 @lru_cache(maxsize=1)

@@ -8,10 +8,16 @@ from csm._types import BoolArray, FloatArray, IntArray
 from csm.mesh import edits
 from csm.mesh.edits import EdgeTable
 from csm.mesh.shape import Mesh
-from csm.mesh.surface import Surface, SurfacePoints
+from csm.mesh.surface import Surface, SurfacePoints, nearest_on_triangles
 
 KEEP_NORMAL = 0.5
 """Least cosine between a face's normals before and after a flip, and across an edge that may be flipped."""
+
+LONG = 4 / 3
+"""Relative length above which `remesh` splits an edge; a collapse makes none longer."""
+
+LOSS = 0.2
+"""Relative distance up to which a vanishing vertex may come to lie from the new faces; keeps finger tips and ears."""
 
 CORNER = 0.7
 """Boundary vertices where the boundary turns by more than acos(0.7), about 45 degrees, never move or vanish."""
@@ -60,22 +66,20 @@ class Draft:
         """Split up to `count` independent edges, longest first, that exceed a relative length; returns how many."""
         table = self.table()
         ratio = self.relative_lengths(table) * self.rng.uniform(0.97, 1.03, len(table.ends))
-        chosen = edits.independent(table, np.flatnonzero(ratio > longer_than), ratio[ratio > longer_than], len(self.faces))
+        chosen = edits.independent(
+            table, np.flatnonzero(ratio > longer_than), ratio[ratio > longer_than], len(self.faces)
+        )
         chosen = chosen[:count]
         t = self.rng.uniform(0.4, 0.6, (len(chosen), 1))
         points = (1 - t) * self.vertices[table.ends[chosen, 0]] + t * self.vertices[table.ends[chosen, 1]]
-        place = self._landing(points, self.place.faces[table.ends[chosen, 0]])
-        on_rim = ~table.inner[chosen]
+        place = self.surface.walk(points, self.place.faces[table.ends[chosen, 0]])
         self.faces = edits.split(self.faces, table, chosen, self.n)
         self.place = SurfacePoints(
             np.concatenate([self.place.faces, place.faces]), np.concatenate([self.place.barycentric, place.barycentric])
         )
         landed = place.interpolate(self.surface.mesh, self.surface.mesh.vertices)
-        self.vertices = np.concatenate([self.vertices, np.where(on_rim[:, None], points, landed)])
+        self.vertices = np.concatenate([self.vertices, landed])
         return len(chosen)
-
-    def _landing(self, points: FloatArray, start: IntArray) -> SurfacePoints:
-        return self.surface.walk(points, start)
 
     def flip(self, rounds: int = 8) -> None:
         """Flip edges towards Delaunay (opposite angles of at most pi together), but not over ridges."""
@@ -92,15 +96,21 @@ class Draft:
 
     def _flip_gain(self, table: EdgeTable, edges: IntArray) -> FloatArray:
         """By how much the opposite angles exceed pi; -1 where a flip would turn a face or cut a ridge."""
-        (a, b), (c, d) = (self.vertices[i] for i in table.ends[edges].T), (self.vertices[i] for i in table.opposite[edges].T)
+        (a, b), (c, d) = (
+            (self.vertices[i] for i in table.ends[edges].T),
+            (self.vertices[i] for i in table.opposite[edges].T),
+        )
         before = _normals(a, b, c), _normals(b, a, d)
         after = _normals(c, d, b), _normals(d, c, a)
         cosines = [(m * n).sum(axis=1) for m in before for n in after] + [(before[0] * before[1]).sum(axis=1)]
         allowed = np.min(cosines, axis=0) > KEEP_NORMAL
         return np.where(allowed, _angles(c, a, b) + _angles(d, a, b) - np.pi, -1.0)
 
-    def collapse_shortest(self, count: int, shorter_than: float) -> int:
-        """Collapse up to `count` independent edges below a relative length, shortest first; returns how many."""
+    def collapse_shortest(self, count: int, shorter_than: float, careful: bool = True) -> int:
+        """Collapse up to `count` independent edges below a relative length, shortest first; returns how many.
+
+        Unless told not to be careful, it makes no long edge and cuts off no tip or rim.
+        """
         table = self.table()
         ratio = self.relative_lengths(table)
         edges = np.flatnonzero(ratio < shorter_than)
@@ -108,9 +118,9 @@ class Draft:
         gone, kept = self._directions(table, edges)
         fine = (gone >= self.n_fixed) & ~(self.stuck(table)[gone])
         edges, gone, kept = edges[fine], gone[fine], kept[fine]
-        fine = self._collapse_keeps_normals(gone, kept)
+        fine = self._collapse_is_fine(gone, kept, careful)
         edges, gone, kept = edges[fine], gone[fine], kept[fine]
-        chosen = edits.independent_collapses(table, edges, -ratio[edges], self.n)
+        chosen = edits.independent_collapses(table, gone, kept, -ratio[edges], self.n)
         chosen = chosen[np.argsort(ratio[edges[chosen]], kind="stable")][:count]
         self.faces = edits.collapse(self.faces, gone[chosen], kept[chosen])
         self._drop(gone[chosen])
@@ -132,10 +142,11 @@ class Draft:
         step /= np.maximum(np.linalg.norm(step, axis=1), 1e-300)[:, None]
         incoming, outgoing = total.copy(), total
         incoming[forward[:, 1]], outgoing[forward[:, 0]] = step, step
-        return edits.boundary_vertices(table, self.n) & ((incoming * outgoing).sum(axis=1) < CORNER)
+        turns: BoolArray = (incoming * outgoing).sum(axis=1) < CORNER
+        return edits.boundary_vertices(table, self.n) & turns
 
-    def _collapse_keeps_normals(self, gone: IntArray, kept: IntArray) -> BoolArray:
-        """Whether moving each `gone` onto its `kept` turns no remaining face by more than acos(KEEP_NORMAL)."""
+    def _collapse_is_fine(self, gone: IntArray, kept: IntArray, careful: bool) -> BoolArray:
+        """Whether moving `gone[k]` onto `kept[k]` turns no face too far, and is careful, shape (K,)."""
         order = np.argsort(self.faces.ravel(), kind="stable")
         begin = np.searchsorted(self.faces.ravel()[order], np.arange(self.n + 1))
         count = begin[gone + 1] - begin[gone]
@@ -146,15 +157,23 @@ class Draft:
         face, owner = face[stays], owner[stays]
         after = np.where(face == gone[owner][:, None], kept[owner][:, None], face)
         before_n, after_n = (_normals(*(self.vertices[f[:, k]] for k in range(3))) for f in (face, after))
-        turned = (before_n * after_n).sum(axis=1) < KEEP_NORMAL
-        return np.bincount(owner[turned], minlength=len(gone)) == 0
+        bad = (before_n * after_n).sum(axis=1) < KEEP_NORMAL
+        fine: BoolArray = np.bincount(owner[bad], minlength=len(gone)) == 0
+        if not careful:
+            return fine
+        reach, loss = np.zeros(len(gone)), np.full(len(gone), np.inf)
+        edges = self.vertices[after] - self.vertices[kept[owner]][:, None]
+        np.maximum.at(reach, owner, np.linalg.norm(edges, axis=2).max(axis=1))
+        np.minimum.at(loss, owner, nearest_on_triangles(self.vertices[gone[owner]], self.vertices[after])[1])
+        fine &= (reach <= LONG * self.wanted()[kept]) & (np.sqrt(loss) <= LOSS * self.wanted()[gone])
+        return fine
 
     def _drop(self, gone: IntArray) -> None:
         keep = np.ones(self.n, dtype=bool)
         keep[gone] = False
         number = np.cumsum(keep) - 1
         self.vertices, self.faces = self.vertices[keep], number[self.faces]
-        self.place = SurfacePoints(self.place.faces[keep], self.place.barycentric[keep])
+        self.place = self.place[keep]
 
     def relax(self, step: float = 0.7) -> None:
         """Move free inner vertices towards the weighted mean of the faces around them, along the surface."""
@@ -175,13 +194,19 @@ class Draft:
         self.move(self.rng.uniform(-1, 1, (self.n, 3)) * (amount * self.wanted())[:, None])
 
     def move(self, offset: FloatArray) -> None:
-        """Move free inner vertices by offsets (n, 3) and back onto the surface; moves that would turn a face are undone."""
+        """Move free inner vertices by offsets (n, 3) and back onto the surface.
+
+        Moves that turn a face, or that end on the other side of a thin part, are undone.
+        """
         free = ~edits.boundary_vertices(self.table(), self.n)
         free[: self.n_fixed] = False
         moved = np.flatnonzero(free)
         place = self.surface.walk(self.vertices[moved] + offset[moved], self.place.faces[moved])
         landed = place.interpolate(self.surface.mesh, self.surface.mesh.vertices)
+        crosses = self.surface.mesh.face_crosses
+        same_side = (crosses[place.faces] * crosses[self.place.faces[moved]]).sum(axis=1) >= 0
         accept = free.copy()
+        accept[moved] = same_side
         before = _normals(*(self.vertices[self.faces[:, k]] for k in range(3)))
         for _ in range(20):
             trial = self.vertices.copy()
@@ -191,14 +216,19 @@ class Draft:
                 break
             accept[self.faces[turned]] = False
         self.vertices = trial
-        self.place.faces[accept], self.place.barycentric[accept] = place.faces[accept[moved]], place.barycentric[accept[moved]]
+        self.place.faces[accept], self.place.barycentric[accept] = (
+            place.faces[accept[moved]],
+            place.barycentric[accept[moved]],
+        )
 
 
 def _normals(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
     n = np.cross(b - a, c - a)
-    return n / np.maximum(np.linalg.norm(n, axis=1), 1e-300)[:, None]
+    unit: FloatArray = n / np.maximum(np.linalg.norm(n, axis=1), 1e-300)[:, None]
+    return unit
 
 
 def _angles(apex: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
     u, v = a - apex, b - apex
-    return np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), (u * v).sum(axis=1))
+    angles: FloatArray = np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), (u * v).sum(axis=1))
+    return angles

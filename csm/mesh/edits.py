@@ -35,7 +35,7 @@ class EdgeTable:
     @property
     def inner(self) -> BoolArray:
         """Which edges have two faces, shape (E,)."""
-        return (self.faces >= 0).all(axis=1)
+        return np.asarray((self.faces >= 0).all(axis=1))
 
     def of_faces(self, n_faces: int) -> IntArray:
         """Numbers of the three edges of each face, shape (n_faces, 3), in no particular order."""
@@ -83,7 +83,7 @@ def split(faces: IntArray, table: EdgeTable, edges: IntArray, first_vertex: int)
 
 
 def flip(faces: IntArray, table: EdgeTable, edges: IntArray) -> IntArray:
-    """Flip independent inner edges whose new edge does not exist yet; of edges with the same new edge only the first."""
+    """Flip independent inner edges whose new edge does not exist yet; of edges with the same new edge the first."""
     n = int(faces.max()) + 1
     low, high = table.opposite[edges].min(axis=1), table.opposite[edges].max(axis=1)
     crossing = low * n + high
@@ -116,7 +116,8 @@ def collapsible(table: EdgeTable, edges: IntArray, n: int) -> BoolArray:
     n_faces = (table.faces[edges] >= 0).sum(axis=1)
     rim = boundary_vertices(table, n)
     spare = (np.diff(link.indptr) > np.where(rim, 2, 3))[table.opposite[edges]] | (table.opposite[edges] < 0)
-    return (common == n_faces) & spare.all(axis=1) & ((n_faces == 1) | ~(rim[i] & rim[j]))
+    linked: BoolArray = (common == n_faces) & spare.all(axis=1) & ((n_faces == 1) | ~(rim[i] & rim[j]))
+    return linked
 
 
 def boundary_vertices(table: EdgeTable, n: int) -> BoolArray:
@@ -126,25 +127,43 @@ def boundary_vertices(table: EdgeTable, n: int) -> BoolArray:
     return rim
 
 
-def independent_collapses(table: EdgeTable, edges: IntArray, priority: FloatArray, n: int) -> IntArray:
-    """Choose edges, highest priority first, whose ends' neighbourhoods do not meet; returns positions in `edges`."""
-    rank = np.empty(len(edges), dtype=np.int64)
-    rank[np.argsort(-priority, kind="stable")] = np.arange(len(edges))
-    best = np.full(n, len(edges))
+def independent_collapses(table: EdgeTable, gone: IntArray, kept: IntArray, priority: FloatArray, n: int) -> IntArray:
+    """Choose collapses `gone[k]` -> `kept[k]` that do not disturb each other, highest priority first where they do.
+
+    Two collapses are independent if neither end of one lies in the closed neighbourhood of the other's vanishing
+    vertex: then each changes no face and no neighbourhood on which the other's link condition rests.  Returns positions
+    in `gone`.
+    """
+    link = adjacency(table, n)
+    rank = np.empty(len(gone), dtype=np.int64)
+    rank[np.argsort(-priority, kind="stable")] = np.arange(len(gone))
+    free, chosen = np.ones(len(gone), dtype=bool), np.zeros(len(gone), dtype=bool)
+    for _ in range(4):
+        at_gone, at_ends = np.full(n, len(gone)), np.full(n, len(gone))
+        np.minimum.at(at_gone, gone[free], rank[free])
+        np.minimum.at(at_ends, gone[free], rank[free])
+        np.minimum.at(at_ends, kept[free], rank[free])
+        claimed, near = _least_around(table, at_gone), _least_around(table, at_ends)
+        chosen |= free & (rank <= claimed[gone]) & (rank <= claimed[kept]) & (rank <= near[gone])
+        vanishing, ends = np.zeros(n), np.zeros(n)
+        vanishing[gone[chosen]], ends[gone[chosen]], ends[kept[chosen]] = 1, 1, 1
+        taken, crowded = vanishing + link @ vanishing > 0, ends + link @ ends > 0
+        free &= ~(taken[gone] | taken[kept] | crowded[gone])
+    return np.flatnonzero(chosen)
+
+
+def _least_around(table: EdgeTable, values: IntArray) -> IntArray:
+    """Least value over each vertex and its neighbours."""
+    least = values.copy()
     for side in range(2):
-        np.minimum.at(best, table.ends[edges, side], rank)
-    for _ in range(3):
-        wider = best.copy()
-        for side in range(2):
-            np.minimum.at(wider, table.ends[:, side], best[table.ends[:, 1 - side]])
-        best = wider
-    return np.flatnonzero((rank[:, None] <= best[table.ends[edges]]).all(axis=1))
+        np.minimum.at(least, table.ends[:, side], values[table.ends[:, 1 - side]])
+    return least
 
 
 def collapse(faces: IntArray, gone: IntArray, kept: IntArray) -> IntArray:
     """Move each vertex `gone[k]` onto `kept[k]` and drop the faces that vanish; vertex numbers stay."""
     target = np.arange(int(faces.max()) + 1)
     target[gone] = kept
-    moved = target[faces]
+    moved: IntArray = target[faces]
     alive = (moved[:, 0] != moved[:, 1]) & (moved[:, 1] != moved[:, 2]) & (moved[:, 2] != moved[:, 0])
-    return moved[alive]
+    return np.compress(alive, moved, axis=0)

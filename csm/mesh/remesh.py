@@ -1,7 +1,8 @@
 """Other triangulations of a shape, with exact ground truth: what tests across resolutions and connectivities need.
 
-`refine` keeps the vertices and adds some, as the LPS-data sets do (Wang et al. 2019: the first 6890 vertices of its
-FAUST shapes are the original ones); `remesh` makes an independent triangulation, as the LRVD sets are (Yan et al. 2014).
+`refine` keeps the vertices and adds some, as the LPS-data sets do (Wang et al. 2019: the first 6890 vertices of
+its FAUST shapes are the original ones); `remesh` makes an independent triangulation, as the LRVD sets are (Yan et al.
+2014).
 """
 
 from __future__ import annotations
@@ -11,22 +12,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from csm._types import FloatArray, IntArray
+from csm._types import FloatArray
 from csm.errors import MeshError
 from csm.mesh.check import check
 from csm.mesh.correspondence import Direction, PointMap
-from csm.mesh.draft import Draft
+from csm.mesh.draft import LONG, Draft
 from csm.mesh.edits import adjacency, edge_table
 from csm.mesh.shape import Mesh
 from csm.mesh.surface import Surface, SurfacePoints
 
 _log = logging.getLogger(__name__)
 
-_UNFIT = {"non_manifold_edges", "non_manifold_vertices", "inconsistent_orientation", "duplicate_faces", "zero_area_faces"}
+_UNFIT = {
+    "non_manifold_edges",
+    "non_manifold_vertices",
+    "inconsistent_orientation",
+    "duplicate_faces",
+    "zero_area_faces",
+}
 
-GRADING = 0.75
-"""How far `remesh` follows the density of its input: 0 makes all edges alike, 1 keeps their proportions.  At 0.75 the
-spread of edge lengths of the built-in humans is that of the LRVD remeshing of FAUST."""
+GRADING = 0.9
+"""How far `remesh` follows the density of its input: 0 makes all edges alike, 1 keeps their proportions.  At 0.9 the
+spread of edge lengths of FAUST with 5000 vertices (standard deviation / mean) is that of its LRVD remeshing (0.47)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +58,8 @@ class Remeshed:
 def refine(mesh: Mesh, n_vertices: int, seed: int = 0) -> Remeshed:
     """Return a finer mesh that has the vertices of `mesh` first and in place, and new ones on its surface.
 
-    The longest edges are split until the count is reached; edges are flipped towards Delaunay and the new vertices relaxed
-    along the surface, so the triangulation is another one although the old vertices are kept.
+    The longest edges are split until the count is reached; edges are flipped towards Delaunay and the new vertices
+    relaxed along the surface, so the triangulation is another one although the old vertices are kept.
 
     Parameters
     ----------
@@ -92,15 +99,15 @@ def refine(mesh: Mesh, n_vertices: int, seed: int = 0) -> Remeshed:
     truth = PointMap.identity(mesh.n_vertices, draft.n, mesh.name)
     finer = Mesh(draft.vertices, draft.faces, mesh.name, mesh.scale)
     location = Surface(finer).at_vertices()
-    return Remeshed(finer, truth, SurfacePoints(*(a[: mesh.n_vertices] for a in (location.faces, location.barycentric))))
+    return Remeshed(finer, truth, location[: mesh.n_vertices])
 
 
 def remesh(mesh: Mesh, n_vertices: int, seed: int = 0) -> Remeshed:
     """Return an independent triangulation of the surface of `mesh` with other vertices, in random order.
 
     Edges are split, collapsed and flipped and vertices moved along the surface until edges have the wanted length
-    (isotropic remeshing after Botsch and Kobbelt 2004), which follows the density of `mesh` in part (`GRADING`).  Corners
-    of the boundary are kept.  The ground truth of an old vertex is the nearest corner of the face that its closest
+    (isotropic remeshing after Botsch and Kobbelt 2004), which follows the density of `mesh` (`GRADING`).  Corners of
+    the boundary are kept.  The ground truth of an old vertex is the nearest corner of the face that its closest
     point on the new surface lies in, searched from the new vertex nearest along the old surface.
 
     Parameters
@@ -123,11 +130,11 @@ def remesh(mesh: Mesh, n_vertices: int, seed: int = 0) -> Remeshed:
     area_factor = np.sqrt(2 / np.sqrt(3) * (mesh.face_areas / sizes[mesh.faces].mean(axis=1) ** 2).sum() / n_vertices)
     draft = Draft(mesh, sizes * area_factor, 0, rng)
     draft.scatter(0.3)
-    for _ in range(8):
-        while draft.split_longest(draft.n, 4 / 3):
-            pass
-        while draft.collapse_shortest(draft.n, 4 / 5):
-            pass
+    for _ in range(6):
+        for _ in range(5):
+            draft.split_longest(draft.n, LONG)
+        for _ in range(5):
+            draft.collapse_shortest(draft.n, 4 / 5)
         draft.flip()
         draft.relax()
         draft.sizes = draft.sizes * np.sqrt(np.clip(draft.n / n_vertices, 0.9, 1.1))
@@ -148,11 +155,11 @@ def _reach(draft: Draft, n_vertices: int, name: str) -> None:
             done = draft.split_longest(missing, 0.85 * float(ratio.max()))
         else:
             done = draft.collapse_shortest(-missing, 1.25 * float(np.quantile(ratio, min(1.0, -missing / draft.n))))
-            done = done or draft.collapse_shortest(1, np.inf)
+            done = done or draft.collapse_shortest(1, np.inf, careful=False)
         if not done:
             raise MeshError(
-                f"{name}: the remeshing stops at {draft.n} vertices, {n_vertices} were wanted: no edge can be collapsed "
-                "without changing the topology or turning a face; ask for more vertices"
+                f"{name}: the remeshing stops at {draft.n} vertices, {n_vertices} were wanted: no edge can be "
+                "collapsed without changing the topology or turning a face; ask for more vertices"
             )
         draft.flip()
 
@@ -162,8 +169,7 @@ def _with_truth(mesh: Mesh, draft: Draft, rng: np.random.Generator) -> Remeshed:
     order = rng.permutation(draft.n)
     number = np.argsort(order)
     new = Mesh(draft.vertices[order], number[rng.permutation(draft.faces)], mesh.name, mesh.scale)
-    place = SurfacePoints(draft.place.faces[order], draft.place.barycentric[order])
-    start: IntArray = Surface(mesh).nearest_marks(place)
+    start = Surface(mesh).nearest_marks(draft.place[order])
     surface = Surface(new)
     location = surface.walk(mesh.vertices, surface.at_vertices().faces[start])
     truth = PointMap(location.nearest_corner(new), Direction.TEMPLATE_TO_SHAPE, new.n_vertices, mesh.name)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from csm._types import FloatArray, IntArray
+from csm._types import BoolArray, FloatArray, IntArray
 from csm.mesh.shape import Mesh
 
 
@@ -30,6 +30,10 @@ class SurfacePoints:
 
     faces: IntArray
     barycentric: FloatArray
+
+    def __getitem__(self, which: slice | IntArray | BoolArray) -> SurfacePoints:
+        """Return some of the points."""
+        return SurfacePoints(self.faces[which], self.barycentric[which])
 
     def interpolate(self, mesh: Mesh, values: FloatArray) -> FloatArray:
         """Interpolate per-vertex values of `mesh`, shape (N,) or (N, C), at the points, shape (P,) or (P, C)."""
@@ -73,33 +77,44 @@ class Surface:
         face = self.incidence.indices[self.incidence.indptr[:-1]].astype(np.int64)
         return SurfacePoints(face, (self.mesh.faces[face] == np.arange(self.mesh.n_vertices)[:, None]).astype(float))
 
-    def walk(self, points: FloatArray, start: IntArray, max_steps: int = 50) -> SurfacePoints:
-        """Return the locally nearest point of the surface for each point (P, 3), going downhill from its start face (P,).
+    @cached_property
+    def spheres(self) -> tuple[FloatArray, FloatArray]:
+        """Centre (M, 3) and radius (M,) of a sphere around each face."""
+        centre = self.mesh.corners.mean(axis=1)
+        return centre, np.linalg.norm(self.mesh.corners - centre[:, None], axis=2).max(axis=1)
 
-        Each step looks at all faces that touch the present one and goes to the nearest; a walk ends where none is nearer.
+    def walk(self, points: FloatArray, start: IntArray, max_steps: int = 50) -> SurfacePoints:
+        """Return the locally nearest surface point for each point (P, 3), going downhill from its start face (P,).
+
+        Each step looks at all faces that touch the present one and goes to the nearest; the walk ends where none is.
         """
         face = start.copy()
         weights, best = nearest_on_triangles(points, self.mesh.corners[face])
         moving = np.arange(len(points))
         for _ in range(max_steps):
-            count = np.diff(self.around.indptr)[face[moving]]
-            owner = np.repeat(np.arange(len(moving)), count)
-            begin = np.cumsum(count) - count
-            offset = np.arange(len(owner)) - np.repeat(begin, count)
-            candidate = self.around.indices[np.repeat(self.around.indptr[face[moving]], count) + offset]
-            w, d = nearest_on_triangles(points[moving][owner], self.mesh.corners[candidate])
-            least = np.lexsort((d, owner))[begin]
-            nearer = d[least] < best[moving] * (1 - 1e-12)
-            changed = moving[nearer]
-            if changed.size == 0:
+            owner, candidate = self._candidates(points[moving], face[moving], best[moving])
+            owner = moving[owner]
+            w, d = nearest_on_triangles(points[owner], self.mesh.corners[candidate])
+            order = np.lexsort((d, owner))
+            first = np.flatnonzero(np.diff(owner[order], prepend=-1))
+            least = order[first]
+            least = least[d[least] < best[owner[least]] * (1 - 1e-12)]
+            moving = owner[least]
+            if moving.size == 0:
                 break
-            face[changed], weights[changed], best[changed] = (
-                candidate[least[nearer]],
-                w[least[nearer]],
-                d[least[nearer]],
-            )
-            moving = changed
+            face[moving], weights[moving], best[moving] = candidate[least], w[least], d[least]
         return SurfacePoints(face, weights)
+
+    def _candidates(self, points: FloatArray, face: IntArray, best: FloatArray) -> tuple[IntArray, IntArray]:
+        """Pairs (point, face) of faces that touch a point's face and may be nearer than sqrt(best)."""
+        count = np.diff(self.around.indptr)[face]
+        owner = np.repeat(np.arange(len(face)), count)
+        offset = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+        candidate = self.around.indices[np.repeat(self.around.indptr[face], count) + offset].astype(np.int64)
+        centre, radius = self.spheres
+        gap = points[owner] - centre[candidate]
+        near = np.einsum("pc,pc->p", gap, gap) < (radius[candidate] + np.sqrt(best)[owner]) ** 2
+        return owner[near], candidate[near]
 
     def nearest_marks(self, marks: SurfacePoints) -> IntArray:
         """Return for each vertex the mark nearest to it along the edges of the mesh, shape (N,).
@@ -142,15 +157,14 @@ def nearest_on_triangles(points: FloatArray, triangles: FloatArray) -> tuple[Flo
     outside = np.flatnonzero(~(weights.min(axis=1) >= 0))
     weights[outside] = _edge_weights(points[outside], triangles[outside])
     offset = np.einsum("pk,pkc->pc", weights, triangles) - points
-    return weights, np.einsum("pc,pc->p", offset, offset)
+    return weights, _dot(offset, offset)
 
 
 def _plane_weights(points: FloatArray, triangles: FloatArray) -> FloatArray:
     """Barycentric weights of the foot in the triangle's plane; some are negative, or NaN, if it lies outside."""
     e1, e2 = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     p = points - triangles[:, 0]
-    d11, d12, d22 = ((x * y).sum(axis=1) for x, y in ((e1, e1), (e1, e2), (e2, e2)))
-    p1, p2 = (p * e1).sum(axis=1), (p * e2).sum(axis=1)
+    d11, d12, d22, p1, p2 = (_dot(x, y) for x, y in ((e1, e1), (e1, e2), (e2, e2), (p, e1), (p, e2)))
     with np.errstate(divide="ignore", invalid="ignore"):
         inverse = 1.0 / (d11 * d22 - d12 * d12)
         u, v = (d22 * p1 - d12 * p2) * inverse, (d11 * p2 - d12 * p1) * inverse
@@ -159,12 +173,18 @@ def _plane_weights(points: FloatArray, triangles: FloatArray) -> FloatArray:
 
 def _edge_weights(points: FloatArray, triangles: FloatArray) -> FloatArray:
     """Barycentric weights of the nearest point of the triangle's three edges."""
-    edge = np.roll(triangles, -1, axis=1) - triangles
-    offset = points[:, None] - triangles
-    t = (offset * edge).sum(axis=2) / np.maximum((edge * edge).sum(axis=2), 1e-300)
-    t = np.clip(t, 0.0, 1.0)
-    k = ((offset - t[..., None] * edge) ** 2).sum(axis=2).argmin(axis=1)
-    rows = np.arange(len(points))
-    weights = np.zeros((len(points), 3))
-    weights[rows, k], weights[rows, (k + 1) % 3] = 1.0 - t[rows, k], t[rows, k]
+    weights, best = np.zeros((len(points), 3)), np.full(len(points), np.inf)
+    for k in range(3):
+        edge, offset = triangles[:, (k + 1) % 3] - triangles[:, k], points - triangles[:, k]
+        t = np.clip(_dot(offset, edge) / np.maximum(_dot(edge, edge), 1e-300), 0.0, 1.0)
+        offset = offset - t[:, None] * edge
+        distance = _dot(offset, offset)
+        nearer = distance < best
+        best[nearer], weights[nearer] = distance[nearer], 0.0
+        weights[nearer, k], weights[nearer, (k + 1) % 3] = 1.0 - t[nearer], t[nearer]
     return weights
+
+
+def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    product: FloatArray = np.einsum("pc,pc->p", a, b)
+    return product
