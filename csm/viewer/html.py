@@ -164,9 +164,11 @@ def _block(block: Block) -> str:
 
 
 def _inline(text: str) -> str:
-    """Escape text and set `code` and **bold**."""
-    text = re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(text))
-    return re.sub(r"\*\*([^*]+)\*\*", r"<strong>\1</strong>", text)
+    """Escape text and set `code` and, outside of code, **bold**."""
+    parts = re.split(r"`([^`]+)`", escape(text))
+    parts[0::2] = [re.sub(r"\*\*([^*]+)\*\*", r"<strong>\1</strong>", part) for part in parts[0::2]]
+    parts[1::2] = [f"<code>{part}</code>" for part in parts[1::2]]
+    return "".join(parts)
 
 
 def _paragraphs(text: str) -> str:
