@@ -20,7 +20,7 @@ def write_toys(folder: Path, n: int = 6, subdivisions: int = 2) -> Path:
     rng = np.random.default_rng(0)
     for i in range(n):
         x = base.vertices
-        bend = 0.15 * np.sin(x @ rng.normal(size=(3, 3)) + rng.uniform(0, 6, 3))
+        bend = 0.04 * np.sin(x @ rng.normal(size=(3, 3)) + rng.uniform(0, 6, 3))
         write_mesh(folder / f"toy{i}.off", Mesh(x + bend, base.faces, f"toy{i}"))
     return folder
 

@@ -72,7 +72,8 @@ def _guarded(run: Run, cfg: DictConfig) -> Any:
     sweeping = HydraConfig.get().mode == RunMode.MULTIRUN
     try:
         result = run(cfg)
-    except Exception as error:
+    except Exception as raised:
+        error = _own_error(raised)
         record = {"status": "failed", "error": str(error), "kind": type(error).__name__}
         write_json(output_folder() / "result.json", record)
         mendable = isinstance(error, CsmError)
@@ -86,6 +87,11 @@ def _guarded(run: Run, cfg: DictConfig) -> Any:
         return None
     write_json(output_folder() / "result.json", {"status": "ok", **result})
     return result.get("objective")
+
+
+def _own_error(error: Exception) -> Exception:
+    """Return the error that Hydra wrapped while it made an object, if it is one of csm's."""
+    return error.__cause__ if isinstance(error.__cause__, CsmError) else error
 
 
 def make_datamodule(cfg: DictConfig) -> CorrespondenceDataModule:

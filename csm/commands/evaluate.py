@@ -9,13 +9,12 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig
 
 from csm.commands.app import command, output_folder
-from csm.commands.testing import keep, numbers, protocol_of, test_on
+from csm.commands.report import conclude
+from csm.commands.testing import numbers, protocol_of, test_on
 from csm.data.datamodule import CorrespondenceDataModule
 from csm.data.store import Store
 from csm.descriptors import from_parameters
 from csm.errors import ConfigError
-from csm.evaluation.report import add_rows
-from csm.evaluation.tables import markdown_table
 from csm.learning.export import load_module
 from csm.learning.module import CSMModule
 
@@ -30,12 +29,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
         test_on(module, datamodule, shapes, protocol_of(cfg.metric), cfg.table)
         for shapes in datamodule.test_sets.values()
     ]
-    keep(tested, output_folder())
-    rows = [t.row for t in tested]
-    if cfg.results:
-        add_rows(cfg.results, rows)
-    print(markdown_table(rows))
-    print(f"rows and curves: {output_folder()}")
+    conclude(tested, output_folder(), cfg.results, f"{cfg.checkpoint}: {module.hparams['training']['protocol']}.")
     return numbers(tested)
 
 

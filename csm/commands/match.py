@@ -26,6 +26,7 @@ from csm.mesh.correspondence import PointMap
 from csm.mesh.io import read_mesh, write_map, write_mesh
 from csm.mesh.shape import Mesh
 from csm.viewer.colors import position_colors, pull_colors
+from csm.viewer.html import Panel, Viewer, viewer_html, write_html
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +93,16 @@ def write_match(matched: Matched, folder: Path, seconds: float) -> None:
     write_mesh(folder / "source.ply", source, colors)
     write_mesh(folder / "target.ply", target, reference)
     write_json(folder / "match.json", _account(matched, meaning, seconds))
+    viewer = Viewer([Panel(source, colors, to_reference=indices), Panel(target, reference)], reference=1)
+    write_html(folder / "match.html", viewer_html(f"{source.name} → {target.name}", viewer, text=_caption(matched)))
+
+
+def _caption(matched: Matched) -> str:
+    return (
+        f"Every vertex of {matched.source.name} is mapped to the vertex of {matched.target.name} that is nearest in "
+        f"{matched.features}. The target is coloured by position; a source vertex has the colour of its match. "
+        f"{100 * matched.match.coverage:.1f} % of the target vertices are reached."
+    )
 
 
 def _account(matched: Matched, meaning: str, seconds: float) -> dict[str, Any]:

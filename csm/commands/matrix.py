@@ -31,7 +31,9 @@ _log = logging.getLogger(__name__)
 def run(cfg: DictConfig) -> dict[str, Any]:
     """Fill the cells that are missing, then write the table over all of them."""
     if not cfg.rows:
-        raise ConfigError("matrix needs rows, such as '+rows.mine=[experiment=humans]', or an experiment that has them")
+        raise ConfigError(
+            "matrix needs rows, such as '+rows.mine=[\"experiment=humans\"]', or an experiment that has them"
+        )
     folder = Path(cfg.folder)
     rows: list[ResultRow] = []
     failures: list[str] = []

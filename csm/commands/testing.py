@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from omegaconf import DictConfig, OmegaConf
@@ -19,7 +18,7 @@ from csm.errors import ConfigError
 from csm.evaluation.matching import nearest_at
 from csm.evaluation.protocol import Protocol, evaluate_matches
 from csm.evaluation.provenance import provenance
-from csm.evaluation.report import ResultRow, result_row, write_curves_csv, write_rows
+from csm.evaluation.report import ResultRow, result_row
 from csm.evaluation.results import Evaluation
 from csm.learning.module import CSMModule
 
@@ -71,12 +70,6 @@ def test_on(
         epochs=training["epochs"],
     )
     return Tested(row, evaluation, [item.shape for item in loaded], descriptors)
-
-
-def keep(tested: Sequence[Tested], folder: Path) -> None:
-    """Write the rows of one job and their CQC curves into its folder."""
-    write_rows(folder / "rows.json", [t.row for t in tested])
-    write_curves_csv(folder / "cqc.csv", {t.row.test: t.evaluation for t in tested})
 
 
 def numbers(tested: Sequence[Tested]) -> dict[str, float]:

@@ -8,19 +8,19 @@ from typing import Any
 
 import lightning as L
 from hydra.utils import instantiate
-from lightning.pytorch.callbacks import ModelCheckpoint, TQDMProgressBar
+from lightning.pytorch.callbacks import ModelCheckpoint
 from omegaconf import DictConfig, OmegaConf
 
 from csm.commands.app import command, make_datamodule, output_folder
-from csm.commands.testing import keep, numbers, protocol_of, test_on
+from csm.commands.report import conclude
+from csm.commands.testing import numbers, protocol_of, test_on
 from csm.data.datamodule import CorrespondenceDataModule
 from csm.errors import ConfigError
 from csm.evaluation.provenance import provenance
-from csm.evaluation.report import add_rows
-from csm.evaluation.tables import markdown_table
 from csm.learning.callbacks import ValidationErrors
 from csm.learning.export import export_module
 from csm.learning.module import CSMModule
+from csm.learning.panels import TensorBoardPanels
 
 
 def run(cfg: DictConfig) -> dict[str, Any]:
@@ -34,12 +34,9 @@ def run(cfg: DictConfig) -> dict[str, Any]:
         test_on(module, datamodule, shapes, protocol_of(cfg.metric), cfg.table)
         for shapes in datamodule.test_sets.values()
     ]
-    keep(tested, folder)
-    rows = [t.row for t in tested]
-    if cfg.results:
-        add_rows(cfg.results, rows)
-    print(markdown_table(rows))
-    print(f"rows and curves: {folder}")
+    conclude(tested, folder, cfg.results, f"{cfg.name}: {module.hparams['training']['protocol']}.")
+    if cfg.logger:
+        print(f"TensorBoard:  tensorboard --logdir {folder}")
     return found | numbers(tested)
 
 
@@ -87,12 +84,15 @@ def make_module(cfg: DictConfig, datamodule: CorrespondenceDataModule) -> CSMMod
 
 def make_trainer(cfg: DictConfig, folder: Path) -> L.Trainer:
     """Make the trainer with its callbacks; the last checkpoint is kept so that a killed run can go on."""
+    errors = ValidationErrors(seed=cfg.seed)
+    groups = ("seed", "data", "descriptor", "model", "optimizer", "trainer")
+    hparams = {name: OmegaConf.to_container(cfg, resolve=True)[name] for name in groups}  # type: ignore[index, call-overload]
     callbacks = [
-        ValidationErrors(seed=cfg.seed),
+        errors,
+        TensorBoardPanels(errors, hparams),
         ModelCheckpoint(
             folder / "checkpoints", filename="last", enable_version_counter=False, save_on_train_epoch_end=True
         ),
-        TQDMProgressBar(leave=False),
     ]
     logger = instantiate(cfg.logger, _partial_=True)(save_dir=folder) if cfg.logger else False
     trainer: L.Trainer = instantiate(cfg.trainer, _partial_=True)(

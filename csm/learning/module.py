@@ -72,6 +72,12 @@ class CSMModule(L.LightningModule):
             self.network = build(options.pop("name"), in_channels, n_classes, **options)
         except ValueError as error:
             raise ConfigError(str(error)) from error
+        wanted = int(getattr(self.network, "ks", 0))
+        if wanted > basis_k:
+            raise ConfigError(
+                f"the network wants {wanted} eigenpairs, the data hold {basis_k}: set data.basis_k={wanted} or a "
+                "smaller model.ks"
+            )
         self.lr, self.weight_decay, self.schedule = lr, weight_decay, schedule
         self.loss_products: Products = loss_products
 

@@ -102,6 +102,10 @@ class CSMCNN(nn.Module):
         y: Tensor = self.finish[-1](self.embed(x))
         return y
 
+    def filters(self, evals: Tensor) -> dict[str, Tensor]:
+        """Return the learned filters of each convolution at the eigenvalues, name -> (K_s, C_in, C_out)."""
+        return {f"conv{i}": conv.filters(evals[: self.ks]) for i, conv in enumerate(self.convs, 1)}  # type: ignore[operator]
+
     def forward(self, x: Tensor, basis: Basis) -> Tensor:
         """Return the logits over the template vertices, shape (N, n_classes)."""
         y: Tensor = self.classifier(self.dropout(self.describe(x, basis)))

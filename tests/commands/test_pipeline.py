@@ -1,0 +1,193 @@
+"""The commands as a user types them, on a toy set: prepare, train, sweep, evaluate, matrix, match."""
+
+from __future__ import annotations
+
+import csv
+import importlib
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from csm.evaluation.report import read_rows
+from csm.mesh.io import read_mesh
+from tests.toyset import write_toys
+
+SMALL = [
+    "data=folder",
+    "data.n_test=2",
+    "data.basis_k=24",
+    "descriptor.angles=4",
+    "descriptor.k=8",
+    "descriptor.order=3",
+    "model.channels=[16,16,16]",
+    "model.descriptor_channels=24",
+    "model.ks=20",
+    "model.dropout=0",
+    "optimizer.lr=0.01",
+    "trainer.max_epochs=60",
+    "trainer.accelerator=cpu",
+    "trainer.check_val_every_n_epoch=30",
+    "+trainer.enable_progress_bar=false",
+    "workers=0",
+]
+
+
+class Bench:
+    """A folder with toy meshes, and a way to run commands in it."""
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.folder, self.monkeypatch = folder, monkeypatch
+        monkeypatch.chdir(folder)
+        monkeypatch.setenv("CSM_CACHE", str(folder / "store"))
+        if not (folder / "toys").exists():
+            write_toys(folder / "toys")
+
+    def run(self, command: str, *arguments: str) -> None:
+        self.monkeypatch.setattr(sys, "argv", [f"csm {command}", *arguments])
+        importlib.import_module(f"csm.commands.{command}").main()
+
+    def json(self, path: str) -> dict:
+        return json.loads((self.folder / path).read_text())
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp("pipeline")
+
+
+@pytest.fixture
+def bench(folder, monkeypatch) -> Bench:
+    return Bench(folder, monkeypatch)
+
+
+@pytest.fixture
+def trained(bench) -> str:
+    """Train once; give the checkpoint."""
+    if not (bench.folder / "run/model.ckpt").exists():
+        bench.run("train", *SMALL, "data.root=toys", "name=toy", "hydra.run.dir=run", "results=results.json")
+    return "run/model.ckpt"
+
+
+def test_training_leaves_a_checkpoint_an_export_rows_curves_and_its_numbers(bench, trained):
+    result = bench.json("run/result.json")
+    assert result["status"] == "ok"
+    assert result["age/toys"] < 0.1
+    assert (bench.folder / "run/export/model.safetensors").exists()
+    assert (bench.folder / "run/checkpoints/last.ckpt").exists()
+    assert list((bench.folder / "run/tensorboard").glob("events*"))
+    (row,) = read_rows(bench.folder / "run/rows.json")
+    assert (row.method, row.train, row.test, row.pairs, row.epochs) == ("toy", "toys", "toys", 2, 60)
+    assert row.age == pytest.approx(result["age/toys"])
+    assert read_rows(bench.folder / "results.json") == [row]
+    assert (bench.folder / "run/cqc.csv").read_text().startswith("threshold,toys")
+
+
+@pytest.mark.parametrize("checkpoint", ["run/model.ckpt", "run/export/model.json"])
+def test_a_checkpoint_evaluates_to_the_same_numbers_without_its_config(bench, trained, checkpoint):
+    bench.run(
+        "evaluate", f"checkpoint={checkpoint}", "data=folder", "data.root=toys", "data.n_test=2", "hydra.run.dir=eval"
+    )
+    assert bench.json("eval/result.json")["age/toys"] == pytest.approx(bench.json("run/result.json")["age/toys"])
+
+
+def test_a_sweep_goes_on_after_a_failing_job_and_ends_in_one_table(bench, capsys):
+    with pytest.raises(SystemExit) as stopped:
+        bench.run(
+            "train", "-m", *SMALL, "data.root=toys", "trainer.max_epochs=1", "model.ks=20,999,10", "hydra.sweep.dir=s"
+        )
+    assert stopped.value.code == 2
+    rows = list(csv.DictReader((bench.folder / "s/sweep.csv").open()))
+    assert [row["status"] for row in rows] == ["ok", "failed", "ok"]
+    assert "999 eigenpairs" in rows[1]["error"]
+    assert float(rows[2]["age/toys"]) > 0
+
+
+def test_a_matrix_is_resumed_cell_by_cell(bench, monkeypatch):
+    row = "+rows.toy=[" + ",".join(f"'{x}'" for x in (*SMALL, "data.root=toys", "trainer.max_epochs=2")) + "]"
+    arguments = ["seeds=[0,1]", "folder=cells", "results=matrix.json", row]
+    bench.run("matrix", *arguments)
+    (table,) = read_rows(bench.folder / "matrix.json")
+    assert table.seeds == (0, 1)
+    assert table.age_std is not None
+    cells = sorted((bench.folder / "cells/toy").glob("seed*/toys_exact_diameter.json"))
+    cells[0].unlink()
+    (bench.folder / "cells/toy/seed1/model.ckpt").unlink()
+    before = cells[1].stat().st_mtime_ns, (bench.folder / "cells/toy/seed0/model.ckpt").stat().st_mtime_ns
+    bench.run("matrix", *arguments)
+    assert cells[0].exists()
+    assert (cells[1].stat().st_mtime_ns, (bench.folder / "cells/toy/seed0/model.ckpt").stat().st_mtime_ns) == before
+    assert not (bench.folder / "cells/toy/seed1/model.ckpt").exists()
+    (again,) = read_rows(bench.folder / "matrix.json")
+    assert again.age == pytest.approx(table.age)
+
+
+@pytest.mark.parametrize("by", ["descriptor=hks descriptor.k=40", "checkpoint=run/model.ckpt"])
+def test_two_meshes_are_matched_and_everything_is_written(bench, trained, by):
+    out = by.partition("=")[0]
+    bench.run("match", "source=toys/toy4.off", "target=toys/toy5.off", f"out={out}", *by.split())
+    indices = np.loadtxt(bench.folder / out / "map.txt", dtype=int)
+    assert (bench.folder / out / "map.txt").read_text().startswith("# line i = vertex of toy5 that vertex i of toy4")
+    np.testing.assert_array_equal(np.load(bench.folder / out / "map.npz")["indices"], indices)
+    if out == "checkpoint":
+        assert (indices == np.arange(162)).mean() > 0.5
+    account = bench.json(f"{out}/match.json")
+    assert account["source"]["name"] == "toy4"
+    assert "0-based" in account["map"]
+    for name in ("source", "target"):
+        assert read_mesh(bench.folder / out / f"{name}.ply").n_vertices == 162
+    assert "://" not in (bench.folder / out / "match.html").read_text()
+
+
+def test_prepare_fills_checks_and_prunes(bench, capsys):
+    bench.run("prepare", *SMALL, "data.root=toys", "store=mine")
+    assert "6 made, 0 already there" in capsys.readouterr().out
+    bench.run("prepare", *SMALL, "data.root=toys", "store=mine")
+    assert "0 made, 6 already there" in capsys.readouterr().out
+    bench.run("prepare", "action=check", "store=mine")
+    assert "all sound" in capsys.readouterr().out
+    entry = next((bench.folder / "mine/lbo").glob("*.npz"))
+    entry.write_bytes(b"")
+    with pytest.raises(SystemExit) as stopped:
+        bench.run("prepare", "action=check", "store=mine")
+    assert stopped.value.code == 2
+    assert entry.name in capsys.readouterr().err
+    bench.run("prepare", "action=prune", "store=mine")
+    assert not entry.exists()
+
+
+@pytest.mark.parametrize(
+    ("command", "arguments", "message"),
+    [
+        ("train", ["data=faust", "data.root=nowhere"], "wanted FAUST_6890"),
+        ("train", [*SMALL, "data.root=toys", "trainer.devices=2"], "one device"),
+        ("train", [*SMALL, "data.root=toys", "model.ks=999"], "data.basis_k=999"),
+        ("train", [*SMALL, "data.root=toys", "model.activation=sine"], "relu"),
+        ("train", [*SMALL, "data.root=toys", "descriptor.alpha=-1"], "alpha"),
+        ("evaluate", [], "checkpoint=PATH"),
+        ("evaluate", ["checkpoint=nothing.ckpt"], "no such checkpoint"),
+        ("match", ["source=toys/toy1.off"], "target=FILE"),
+        ("match", ["source=toys/nothing.off", "target=toys/toy1.off", "out=o"], "there is no such file"),
+        ("describe", ["mesh=toys/toy1.off", "out=a.txt"], ".npz"),
+        ("check", ["folder=nowhere"], "nowhere"),
+        ("matrix", [], "rows"),
+        ("prepare", ["action=dance"], "fill, check or prune"),
+    ],
+)
+def test_errors_are_one_paragraph_and_status_2(bench, capsys, command, arguments, message):
+    with pytest.raises(SystemExit) as stopped:
+        bench.run(command, *arguments, "hydra.run.dir=failed")
+    said = capsys.readouterr().err
+    assert stopped.value.code == 2
+    assert message in said
+    assert "Traceback" not in said
+
+
+def test_describe_writes_values_with_their_columns(bench):
+    bench.run("describe", "mesh=toys/toy0.off", "out=d.npz", "descriptor.angles=3", "descriptor.order=1")
+    with np.load(bench.folder / "d.npz") as found:
+        assert found["values"].shape == (162, 6)
+        assert found["columns"][1] == "theta=0.000 T1"
+        assert json.loads(str(found["parameters"]))["angles"] == 3
