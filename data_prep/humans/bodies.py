@@ -22,12 +22,12 @@ SUBJECTS = np.array(
         # gender age muscle weight height proportions
         [0.00, 0.68, 0.55, 0.45, 0.42, 0.60],
         [1.00, 0.67, 0.45, 0.42, 0.48, 0.65],
-        [0.00, 0.76, 0.40, 0.78, 0.38, 0.45],
-        [1.00, 0.80, 0.40, 0.72, 0.40, 0.45],
+        [0.00, 0.76, 0.40, 0.88, 0.38, 0.45],
+        [1.00, 0.80, 0.40, 0.84, 0.40, 0.45],
         [0.00, 0.66, 0.85, 0.55, 0.50, 0.75],
         [1.00, 0.94, 0.35, 0.55, 0.38, 0.40],
         [0.05, 0.92, 0.42, 0.38, 0.42, 0.45],
-        [0.95, 0.64, 0.62, 0.30, 0.55, 0.70],
+        [0.95, 0.64, 0.62, 0.22, 0.55, 0.70],
         [0.10, 0.52, 0.45, 0.40, 0.40, 0.55],
         [0.90, 0.72, 0.50, 0.58, 0.45, 0.55],
     ]
@@ -101,7 +101,7 @@ POSES = (
             "spine": (62, 0, 0),
             "hip": (-28, -9, 0),
             "root": (28, 0, 0),
-            "arm": (0, 20, -75),
+            "arm": (0, -8, -66),
             "elbow": (0, 0, -12),
             "knee": (8, 0, 0),
             "neck": (10, 0, 0),
@@ -206,7 +206,7 @@ def pose_matrices(pose: Pose, extra_lift: float, jitter: NDArray[np.float64], ri
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """What the poses need to know of a skeleton: names, parents (-1 for the root), heads in the reference pose (metres)."""
+    """What poses need of a skeleton: names, parents (-1 for the root), heads in the reference pose (metres)."""
 
     labels: list[str]
     parents: list[int]

@@ -52,7 +52,7 @@ def boundary_loops(faces: Ints) -> list[list[int]]:
 
 
 def fill(vertices: Floats, loop: list[int]) -> Ints:
-    """Triangulate a loop with the least sum of squared edge lengths (dynamic programme over its chords), shape (n - 2, 3)."""
+    """Triangulate a loop with the least sum of squared edge lengths (dynamic programme), shape (n - 2, 3)."""
     p = vertices[loop]
     n = len(loop)
     square = ((p[:, None] - p[None]) ** 2).sum(2)

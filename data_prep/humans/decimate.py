@@ -11,7 +11,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 TANGENTIAL = 0.03
-"""Weight of the squared edge length beside the squared distance to the surface, so that flat dense regions thin out evenly."""
+"""Weight of squared edge length beside squared distance to the surface: flat dense regions thin out evenly."""
 MAX_VALENCE = 9
 MIN_QUALITY = 0.25
 

@@ -31,8 +31,8 @@ def intersecting_pairs(vertices: Floats, faces: Ints) -> Ints:
 def untangle(vertices: Floats, faces: Ints, rounds: int = 60) -> Floats:
     """Smooth the surroundings of intersecting triangles until none are left or `rounds` have passed.
 
-    Each round moves the vertices of the offending triangles halfway, and their neighbours a quarter, towards the mean of
-    their own neighbours; creases of skinning (groin, armpit) and touching toes come apart, all else stays untouched.
+    Each round moves the vertices of the offending triangles halfway, and their neighbours a quarter, towards the mean
+    of their own neighbours; creases of skinning (groin, armpit) and touching toes come apart, all else stays untouched.
     """
     x = vertices.copy()
     n = len(x)

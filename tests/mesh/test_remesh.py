@@ -13,7 +13,7 @@ from csm.mesh.check import check
 from csm.mesh.edits import edge_table
 from csm.mesh.remesh import Remeshed, refine, remesh
 from csm.mesh.shape import Mesh
-from csm.mesh.surface import Surface, nearest_on_triangles
+from csm.mesh.surface import nearest_on_triangles
 from tests.shapes import blob, cylinder, plane, sphere, torus
 
 CLOSED = {"sphere": lambda: sphere(3), "torus": torus, "blob": lambda: blob(3)}
@@ -122,19 +122,6 @@ def test_truth_stays_on_its_sheet() -> None:
     assert mean_edge(result.mesh) > 4 * np.abs(coin.vertices[:, 2]).max()
     there = result.mesh.vertices[result.truth.indices[flat], 2]
     assert (there * coin.vertices[flat, 2] >= 0).all()
-
-
-def test_walk_finds_the_nearest_point_of_a_convex_surface() -> None:
-    mesh = sphere(2)
-    rng = np.random.default_rng(0)
-    points = rng.normal(size=(200, 3))
-    start = rng.integers(0, mesh.n_faces, 200)
-    place = Surface(mesh).walk(points, start)
-    found = np.linalg.norm(place.interpolate(mesh, mesh.vertices) - points, axis=1)
-    outside = np.linalg.norm(points, axis=1) > 1
-    np.testing.assert_allclose(found[outside], brute_force_distance(points, mesh)[outside], atol=1e-9)
-    assert place.barycentric.min() >= 0
-    np.testing.assert_allclose(place.barycentric.sum(axis=1), 1, atol=1e-12)
 
 
 def test_unfit_meshes_and_counts_are_refused_with_a_reason() -> None:
