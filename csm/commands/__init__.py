@@ -1,1 +1,1 @@
-"""csm.commands."""
+"""The commands, one thin file each; the only room that knows Hydra."""

@@ -1,1 +1,1 @@
-"""csm.learning."""
+"""Training: the LightningModule, the loss, callbacks, checkpoints and exports."""

@@ -1,1 +1,16 @@
-"""Triangle meshes: the type, files, correspondences and findings."""
+"""Triangle meshes: the type, files, correspondences, findings and remeshing."""
+
+from csm.mesh.correspondence import Direction, GroundTruth, PointMap, ground_truth
+from csm.mesh.io import read_mesh, read_vts, write_mesh
+from csm.mesh.shape import Mesh
+
+__all__ = [
+    "Direction",
+    "GroundTruth",
+    "Mesh",
+    "PointMap",
+    "ground_truth",
+    "read_mesh",
+    "read_vts",
+    "write_mesh",
+]
