@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
@@ -24,12 +24,13 @@ from csm.evaluation.results import Evaluation
 from csm.mesh.io import atomic_path
 from csm.mesh.shape import Mesh
 from csm.viewer.camera import View
-from csm.viewer.colors import ERROR_COLORMAP, position_colors, pull_colors, scalar_colors
+from csm.viewer.colors import ERROR_COLORMAP, Colors, position_colors, pull_colors, scalar_colors
 from csm.viewer.picture import Picture
 from csm.viewer.render import render
 
 # Okabe and Ito, "Color universal design", 2008: told apart by people with any colour vision; yellow is left out.
 CYCLE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
+_DPI = 150
 _DASHES = ("-", "--", "-.", ":")
 _NORMALISERS = {"diameter": "fraction of the geodesic diameter", "sqrt_area": "fraction of the square root of the area"}
 # Dates would make two runs differ; an entry of None leaves matplotlib's own out.
@@ -187,38 +188,26 @@ def correspondence_figure(
     ConfigError
         If the map or the errors do not fit the shapes.
     """
-    for what, given in (("map", indices), ("errors", errors)):
-        if given is not None and given.shape != (source.n_vertices,):
-            raise ConfigError(
-                f"{source.name} -> {target.name}: the {what} has shape {given.shape}; "
-                f"wanted one entry for each of the {source.n_vertices} vertices of the source"
-            )
+    _require_map(source, target, indices, errors)
     view = view or View(up="auto")
     reference = position_colors(target, up=view.up)
     drawn = [
         (f"source {source.name}, colours of its matches", source, pull_colors(reference, indices)),
         (f"target {target.name}, coloured by position", target, reference),
     ]
-    if errors is not None:
-        high = _high(errors)
-        drawn.append((f"error on {source.name}", source, scalar_colors(errors, 0.0, high, ERROR_COLORMAP)))
-    dpi = 150
-    figure = Figure(figsize=(len(drawn) * size[0] / dpi + 0.9, size[1] / dpi + 0.4), dpi=dpi, layout="constrained")
-    FigureCanvasAgg(figure)
-    panels = figure.subplots(1, len(drawn), squeeze=False)[0]
-    for axes, (title, mesh, colors) in zip(panels, drawn, strict=True):
-        axes.imshow(render(mesh, colors, size=size, view=view), interpolation="antialiased")
-        axes.set_title(title, fontsize=7)
-        axes.set_axis_off()
-    if errors is not None:
-        scale = ScalarMappable(Normalize(0, high), ERROR_COLORMAP)
-        bar = figure.colorbar(scale, ax=panels[-1], shrink=0.7, extend="max")
-        bar.set_label(_error_label(normaliser), fontsize=7)
-        bar.ax.tick_params(labelsize=7)
+    if errors is None:
+        return _drawings(drawn, view, size)
+    high = _high(errors)
+    drawn.append((f"error on {source.name}", source, scalar_colors(errors, 0.0, high, ERROR_COLORMAP)))
+    figure = _drawings(drawn, view, size)
+    scale = ScalarMappable(Normalize(0, high), ERROR_COLORMAP)
+    bar = figure.colorbar(scale, ax=figure.axes[-1], shrink=0.7, extend="max")
+    bar.set_label(_error_label(normaliser), fontsize=7)
+    bar.ax.tick_params(labelsize=7)
     return figure
 
 
-def figure_to_array(figure: Figure, dpi: float = 150) -> Picture:
+def figure_to_array(figure: Figure, dpi: float = _DPI) -> Picture:
     """Draw a figure into pixels, shape (H, W, 3)."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=dpi)
@@ -238,6 +227,27 @@ def save_figure(path: str | os.PathLike[str], figure: Figure, dpi: float = 200) 
         raise ConfigError(f"{path}: figures are written as {', '.join(_UNDATED)}; choose one of these endings")
     with atomic_path(path) as temporary:
         figure.savefig(temporary, dpi=dpi, metadata=_UNDATED[suffix])
+
+
+def _require_map(source: Mesh, target: Mesh, indices: IntArray, errors: FloatArray | None) -> None:
+    for what, given in (("map", indices), ("errors", errors)):
+        if given is not None and given.shape != (source.n_vertices,):
+            raise ConfigError(
+                f"{source.name} -> {target.name}: the {what} has shape {given.shape}; "
+                f"wanted one entry for each of the {source.n_vertices} vertices of the source"
+            )
+
+
+def _drawings(drawn: Sequence[tuple[str, Mesh, Colors]], view: View, size: tuple[int, int]) -> Figure:
+    """Put titled drawings of coloured meshes side by side."""
+    figure = Figure(figsize=(len(drawn) * size[0] / _DPI + 0.9, size[1] / _DPI + 0.4), dpi=_DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(1, len(drawn), squeeze=False)[0]
+    for axes, (title, mesh, colors) in zip(panels, drawn, strict=True):
+        axes.imshow(render(mesh, colors, size=size, view=view), interpolation="antialiased")
+        axes.set_title(title, fontsize=7)
+        axes.set_axis_off()
+    return figure
 
 
 def _figure(width: float, height: float) -> tuple[Figure, Axes]:

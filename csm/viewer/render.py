@@ -11,12 +11,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from csm._types import BoolArray, Float32Array, FloatArray
+from csm._types import Float32Array, FloatArray, IntArray
 from csm.errors import ConfigError, MeshError
 from csm.mesh.shape import Mesh
 from csm.viewer.camera import View, project, rotation
 from csm.viewer.picture import Picture, contact_sheet, save_png
-from csm.viewer.raster import fragments_at, interpolate, visible_faces
+from csm.viewer.raster import Fragments, fragments_at, interpolate, visible_faces
 from csm.viewer.shade import creases, edge_ink, encoded, light, linear
 
 __all__ = ["Picture", "View", "as_colors", "contact_sheet", "render", "save_png", "vertex_normals"]
@@ -76,17 +76,12 @@ def render(
     nearest = visible_faces(triangles, width, height)
     covered = np.flatnonzero(nearest >= 0)
     seen = fragments_at(triangles, nearest, covered, width)
-    corners = mesh.faces[seen.face]
-    surface = interpolate(seen.weights, vertex_colors, corners)
+    surface = interpolate(seen.weights, vertex_colors, mesh.faces[seen.face])
     if lighting:
-        normals = (vertex_normals(mesh) @ rotation(mesh, view).T).astype(np.float32)
-        dark = creases(seen.depth, covered, (height, width))
-        surface = light(surface, interpolate(seen.weights, normals, corners), dark)
+        surface = light(surface, _normals(mesh, view, seen), creases(seen.depth, covered, (height, width)))
     if wireframe:
         surface *= edge_ink(triangles, seen, half_width=0.5 * supersample)[:, None]
-    premultiplied = np.zeros((height * width, 3), dtype=np.float32)
-    premultiplied[covered] = surface
-    return _finish(premultiplied, nearest >= 0, size, supersample, background)
+    return _finish(surface, covered, size, supersample, background)
 
 
 def vertex_normals(mesh: Mesh) -> FloatArray:
@@ -131,14 +126,24 @@ def _require_drawable(mesh: Mesh, size: tuple[int, int], supersample: int, backg
         raise ConfigError(f"background is {background!r}, wanted white or transparent")
 
 
-def _finish(
-    premultiplied: Float32Array, covered: BoolArray, size: tuple[int, int], samples: int, background: str
-) -> Picture:
+def _normals(mesh: Mesh, view: View, seen: Fragments) -> Float32Array:
+    """Return the smooth normal at each fragment in the viewer's frame, shape (P, 3), not of unit length."""
+    normals = (vertex_normals(mesh) @ rotation(mesh, view).T).astype(np.float32)
+    return interpolate(seen.weights, normals, mesh.faces[seen.face])
+
+
+def _finish(surface: Float32Array, covered: IntArray, size: tuple[int, int], samples: int, background: str) -> Picture:
     """Average the samples of each pixel in linear light and encode them."""
-    grid = (size[1], samples, size[0], samples)
-    alpha = covered.reshape(grid).mean(axis=(1, 3), dtype=np.float32)[..., None]
-    color = premultiplied.reshape(*grid, 3).mean(axis=(1, 3))
+    width, height = size
+    row, column = covered // (width * samples) // samples, covered % (width * samples) // samples
+    pixel = row * width + column
+    sums = [np.bincount(pixel, weights, minlength=width * height) for weights in (None, *surface.T)]
+    alpha, *color = np.stack(sums).reshape(4, height, width) / samples**2
     if background == "white":
-        return np.round(encoded(color + (1 - alpha)) * 255).astype(np.uint8)
-    straight = encoded(color / np.maximum(alpha, 1e-6))
-    return np.round(np.concatenate([straight, alpha], axis=-1) * 255).astype(np.uint8)
+        return _bytes(encoded(np.stack(color, axis=-1) + (1 - alpha[..., None])))
+    straight = encoded(np.stack(color, axis=-1) / np.maximum(alpha, 1e-6)[..., None])
+    return _bytes(np.dstack([straight, alpha]))
+
+
+def _bytes(fractions: NDArray[np.floating[Any]]) -> Picture:
+    return np.round(fractions * 255).astype(np.uint8)
