@@ -15,7 +15,6 @@ TESTS = ROOT / "tests"
 MODULES = sorted((ROOT / "csm").rglob("*.py"))
 SOURCES = [*MODULES, *(p for d in ("tests", "data_prep", "benchmarks") for p in sorted((ROOT / d).rglob("*.py")))]
 
-EVERYWHERE = {"csm", "_types", "errors"}
 ROOMS = {
     "mesh": set(),
     "operators": {"mesh"},
@@ -202,7 +201,7 @@ def test_every_public_module_has_its_tests():
 def test_every_test_file_has_its_module():
     names = {name_of(path) for path in MODULES}
     for path in TESTS.rglob("test_*.py"):
-        inner = path.relative_toTESTS.with_suffix("")
+        inner = path.relative_to(TESTS).with_suffix("")
         name = ".".join([*inner.parts[:-1], inner.name.removeprefix("test_")])
         assert name in names | NOT_OF_A_MODULE or inner.parts[0] in ("data_prep", "benchmarks"), (
             f"{path} mirrors nothing"
