@@ -29,16 +29,16 @@ def make(datamodule, **options) -> CSMModule:
 
 
 def train(module, datamodule, folder, epochs=12, **options) -> Trainer:
-    trainer = Trainer(
-        max_epochs=epochs,
-        default_root_dir=folder,
-        accelerator="cpu",
-        logger=False,
-        enable_progress_bar=False,
-        enable_model_summary=False,
-        num_sanity_val_steps=0,
-        **options,
-    )
+    settings = {
+        "max_epochs": epochs,
+        "default_root_dir": folder,
+        "accelerator": "cpu",
+        "logger": False,
+        "enable_progress_bar": False,
+        "enable_model_summary": False,
+        "num_sanity_val_steps": 0,
+    }
+    trainer = Trainer(**(settings | options))
     trainer.fit(module, datamodule=datamodule)
     return trainer
 
