@@ -6,10 +6,9 @@ import io
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
@@ -27,11 +26,9 @@ from csm.viewer.camera import View
 from csm.viewer.colors import ERROR_COLORMAP, Colors, position_colors, pull_colors, scalar_colors
 from csm.viewer.picture import Picture
 from csm.viewer.render import render
+from csm.viewer.style import CYCLE, line_style, new_figure, plain_axes
 
-# Okabe and Ito, "Color universal design", 2008: told apart by people with any colour vision; yellow is left out.
-CYCLE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 _DPI = 150
-_DASHES = ("-", "--", "-.", ":")
 _NORMALISERS = {"diameter": "fraction of the geodesic diameter", "sqrt_area": "fraction of the square root of the area"}
 # Dates would make two runs differ; an entry of None leaves matplotlib's own out.
 _UNDATED: Mapping[str, dict[str, str | None]] = {
@@ -75,11 +72,11 @@ def cqc_figure(curves: Curves, *, normaliser: str = "diameter", limit: float | N
     found = {c.protocol.normaliser if isinstance(c, Evaluation) else normaliser for c in curves.values()}
     if len(found) != 1:
         raise ConfigError(f"cqc figure: {len(curves)} curves in {len(found)} normalisers; wanted some curves in one")
-    figure, axes = _figure(5.2, 3.9)
+    figure, axes = new_figure(5.2, 3.9)
     for k, (name, given) in enumerate(curves.items()):
         curve = Curve(given.thresholds, given.cqc, given.summary["age"]) if isinstance(given, Evaluation) else given
         thresholds, fractions, age = curve
-        axes.plot(thresholds, 100 * fractions, label=f"{name} (AGE {1000 * age:.1f})", **_line(k))
+        axes.plot(thresholds, 100 * fractions, label=f"{name} (AGE {1000 * age:.1f})", **line_style(k))
     last = max(float(line.get_xdata()[-1]) for line in axes.get_lines())  # type: ignore[index, arg-type]
     axes.set_xlim(0, last if limit is None else limit)
     axes.set_ylim(0, 100)
@@ -101,12 +98,12 @@ def error_histogram(errors: Mapping[str, FloatArray], *, normaliser: str = "diam
     """
     if not errors or any(np.size(e) == 0 for e in errors.values()):
         raise ConfigError(f"error histogram: wanted errors of at least one method, got {list(errors)}")
-    figure, axes = _figure(5.2, 3.6)
+    figure, axes = new_figure(5.2, 3.6)
     edges = np.linspace(0, max(float(np.max(e)) for e in errors.values()) or 1.0, bins + 1)
     for k, (name, values) in enumerate(errors.items()):
         counts, _ = np.histogram(values[values > 0], edges)
         exact = 100 * float(np.mean(values == 0))
-        axes.stairs(100 * counts / len(values), edges, label=f"{name} ({exact:.1f} % exact)", **_line(k))
+        axes.stairs(100 * counts / len(values), edges, label=f"{name} ({exact:.1f} % exact)", **line_style(k))
     axes.set_yscale("log")
     axes.set_xlim(0, edges[-1])
     axes.set_xlabel(_error_label(normaliser))
@@ -147,7 +144,7 @@ def filters_figure(evals: ArrayLike, responses: Mapping[str, NDArray[np.floating
         axes.autoscale_view()
         axes.set_title(f"{name}: {len(lines)} filters", fontsize=10)
         axes.set_xlabel("eigenvalue λ (1 / area)")
-        _plain(axes)
+        plain_axes(axes)
     panels[0].set_ylabel("response")
     panels[0].legend(frameon=False, fontsize=8)
     return figure
@@ -248,25 +245,6 @@ def _drawings(drawn: Sequence[tuple[str, Mesh, Colors]], view: View, size: tuple
         axes.set_title(title, fontsize=7)
         axes.set_axis_off()
     return figure
-
-
-def _figure(width: float, height: float) -> tuple[Figure, Axes]:
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots()
-    _plain(axes)
-    return figure, axes
-
-
-def _plain(axes: Axes) -> None:
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(color="0.9", linewidth=0.8)
-    axes.set_axisbelow(True)
-
-
-def _line(k: int) -> dict[str, Any]:
-    dash = _DASHES[k // len(CYCLE) % len(_DASHES)]
-    return {"color": CYCLE[k % len(CYCLE)], "linestyle": dash, "linewidth": 1.8}
 
 
 def _error_label(normaliser: str) -> str:

@@ -43,13 +43,16 @@ def creases(depth: Float32Array, covered: IntArray, shape: tuple[int, int]) -> F
     Source: Luft, Colditz, Deussen, "Image enhancement by unsharp masking the depth buffer", ACM TOG 25(3), 2006; here
     the blur looks at covered pixels only, so that an outline throws no halo.
     """
+    if covered.size == 0:
+        return np.zeros(0, np.float32)
     radius = _CREASE_RADIUS * shape[0]
-    mask, field = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
-    mask.ravel()[covered] = 1
-    field.ravel()[covered] = depth
-    weight = gaussian_filter(mask, radius, truncate=2).ravel()[covered]
-    blurred = gaussian_filter(field, radius, truncate=2).ravel()[covered] / np.maximum(weight, np.float32(1e-6))
-    return np.clip((depth - blurred) / np.float32(4 * radius), 0, 1)
+    row, column = covered // shape[1], covered % shape[1]
+    here = (row - row.min(), column - column.min())  # only the part of the picture that shows something is blurred
+    mask, field = np.zeros((2, int(here[0].max()) + 1, int(here[1].max()) + 1), np.float32)
+    mask[here], field[here] = 1, depth
+    weight, blurred = (gaussian_filter(a, radius, truncate=2, mode="constant")[here] for a in (mask, field))
+    behind: Float32Array = np.clip((depth - blurred / np.maximum(weight, np.float32(1e-6))) / (4 * radius), 0, 1)
+    return behind.astype(np.float32, copy=False)
 
 
 def edge_ink(triangles: FloatArray, seen: Fragments, half_width: float) -> Float32Array:
