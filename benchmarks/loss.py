@@ -100,6 +100,8 @@ def growth_megabytes(variant: str) -> float:
 
 
 def measure(repeats: int, threads: int) -> list[Row]:
+    # First, while this process is small: on Linux a child starts with its parent's peak.
+    peaks = {variant: peak_megabytes(variant, threads) for variant in VARIANTS}
     given = problem()
     results = {variant: one_pass(variant, given) for variant in VARIANTS}
     times: dict[str, list[float]] = {variant: [] for variant in VARIANTS}
@@ -112,7 +114,7 @@ def measure(repeats: int, threads: int) -> list[Row]:
             variant,
             1e3 * median[variant],
             median[REFERENCE] / median[variant],
-            peak_megabytes(variant, threads),
+            peaks[variant],
             relative(results[variant].loss, reference.loss),
             max(map(relative, results[variant].gradients, reference.gradients)),
         )
@@ -137,7 +139,9 @@ def main() -> None:
     for row in rows:
         print(f"{row.variant:<28}{row.milliseconds:>8.0f}{row.speedup:>10.2f}{row.megabytes:>8.0f}", end="")
         print(f"{row.loss_error:>10.1e}{row.gradient_error:>10.1e}")
-    made = replace(provenance(), command=f"python benchmarks/loss.py --threads {options.threads}")
+    made = replace(
+        provenance(), command=f"python benchmarks/loss.py --threads {options.threads} --repeats {options.repeats}"
+    )
     content = {"n": N, "d": D, "threads": options.threads, "repeats": options.repeats, **asdict(made)}
     with atomic_path(options.out) as temporary:
         temporary.write_text(json.dumps(content | {"rows": [asdict(row) for row in rows]}, indent=1) + "\n")
