@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import lightning as L
-import numpy as np
 from torch import Tensor
 
 from csm._types import IntArray
@@ -36,9 +34,7 @@ class ValidationErrors(L.Callback):
     """
 
     def __init__(self, pairs: int = 6, points: int = 500, seed: int = 0) -> None:
-        self.protocol = Protocol(sample=pairs, seed=seed, distance="heat")
-        self.points = points
-        self.seed = seed
+        self.protocol = Protocol(sample=pairs, points=points, seed=seed, distance="heat")
         self.latest: Evaluation | None = None
         self._descriptors: dict[str, Tensor] = {}
 
@@ -54,7 +50,7 @@ class ValidationErrors(L.Callback):
         if trainer.sanity_checking or not isinstance(datamodule, CorrespondenceDataModule):
             return
         found, self._descriptors = self._descriptors, {}
-        shapes = [self._thinned(shape) for shape in datamodule.validation_shapes() if shape.name in found]
+        shapes = [shape for shape in datamodule.validation_shapes() if shape.name in found]
 
         def match(source: Shape, target: Shape) -> IntArray:
             return nearest_at(found[source.name], found[target.name], source.truth.known)
@@ -62,11 +58,3 @@ class ValidationErrors(L.Callback):
         self.latest = evaluate_matches(shapes, match, self.protocol, progress=False)
         pl_module.log("val/age", self.latest.summary["age"], prog_bar=True)
         pl_module.log("val/exact", self.latest.summary["exact"], prog_bar=True)
-
-    def _thinned(self, shape: Shape) -> Shape:
-        """Return the shape with only the sampled template points known."""
-        truth = shape.truth
-        drop = np.random.default_rng(self.seed).permutation(truth.n_from)[self.points :]
-        indices = truth.indices.copy()
-        indices[drop] = -1
-        return replace(shape, truth=replace(truth, indices=indices), mirror=None)

@@ -199,3 +199,16 @@ def test_near_misses_on_bodies_take_seconds(data_set: Callable[[str], Path]) -> 
         assert row.age * row.diameter <= edges.mean() + 1e-12
         assert row.age * row.diameter >= 0.98 * edges.mean()
         assert 1.4 < row.diameter / row.sqrt_area < 1.7
+
+
+def test_some_points_of_all_pairs_give_the_errors_of_exactly_these_points():
+    mesh = blob(2)
+    shapes = [Shape(Mesh(mesh.vertices, mesh.faces, name), PointMap.identity(162)) for name in "ab"]
+    indices = np.roll(np.arange(162), 1)
+    full = evaluate_matches(shapes, lambda s, t: indices, Protocol(), progress=False)
+    some = evaluate_matches(shapes, lambda s, t: indices, Protocol(points=40, seed=3), progress=False)
+    chosen = np.sort(np.random.default_rng(3).permutation(162)[:40])
+    np.testing.assert_allclose(some.errors, np.concatenate([full.errors[chosen], full.errors[162 + chosen]]))
+    assert "those of 40 (drawn with seed 3) template points" in some.describe()
+    with pytest.raises(ConfigError, match="points=0"):
+        Protocol(points=0)
