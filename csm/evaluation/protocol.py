@@ -120,7 +120,8 @@ class Protocol:
             f"{'' if n_pairs is None else f'{n_pairs} '}pairs ({which}); error = {_DISTANCES[self.distance]} on the "
             f"target from the true to the matched vertex, divided by the {_NORMALISERS[self.normaliser]}; "
             f"mean over {self._points()} template points known on both shapes, pooled over pairs; a match on "
-            f"another component counts as one diameter; left-right flip: nearer to the mirrored truth by more than {FLIP_MARGIN:g}."
+            f"another component counts as one diameter; left-right flip: nearer to the mirrored truth "
+            f"by more than {FLIP_MARGIN:g}."
         )
 
 
