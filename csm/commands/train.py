@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import time
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +46,7 @@ def fit(cfg: DictConfig, datamodule: CorrespondenceDataModule, folder: Path) -> 
     """Train and save ``model.ckpt`` in `folder`; return the module and what was measured on the way."""
     if cfg.trainer.devices not in (1, "auto") or cfg.trainer.get("num_nodes", 1) != 1:
         raise ConfigError(f"trainer.devices={cfg.trainer.devices}: csm trains on one device, as a batch is one shape")
+    _quiet_lightning()
     L.seed_everything(cfg.seed, workers=True, verbose=False)
     datamodule.prepare_data()
     module = make_module(cfg, datamodule)
@@ -57,6 +60,14 @@ def fit(cfg: DictConfig, datamodule: CorrespondenceDataModule, folder: Path) -> 
     print(f"trained for {seconds / 60:.1f} minutes: {checkpoint}")
     measured = {key: float(value) for key, value in trainer.callback_metrics.items()}
     return module, {"seconds": seconds, "checkpoint": str(checkpoint), **measured}
+
+
+def _quiet_lightning() -> None:
+    """Keep Lightning's hints and advertisements out of the output; its warnings stay."""
+    logging.getLogger("lightning.pytorch").setLevel(logging.WARNING)
+    logging.getLogger("lightning.fabric").setLevel(logging.WARNING)
+    warnings.filterwarnings("ignore", message=r".*LeafSpec.*is deprecated")
+    warnings.filterwarnings("ignore", message=r".*does not have many workers.*")
 
 
 def make_module(cfg: DictConfig, datamodule: CorrespondenceDataModule) -> CSMModule:
