@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test lint clean
+.PHONY: install demo test lint tables clean
 
 install: $(STAMP)
 
@@ -27,6 +27,10 @@ lint: install
 # One thread per process: the workers share the cores already.
 test: lint
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(WORKERS) --doctest-modules csm tests
+
+# The tables of the README, from the json files under results/.
+tables: install
+	$(BIN)/python -m tests.readme_tables
 
 clean:
 	rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis

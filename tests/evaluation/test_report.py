@@ -125,3 +125,19 @@ def test_csv_of_rows_and_of_curves(tmp_path: Path) -> None:
     np.testing.assert_allclose(values, np.column_stack([run.thresholds, run.cqc]), atol=1e-6)
     with pytest.raises(DataError, match="no curve"):
         report.write_curves_csv(tmp_path / "c.csv", {})
+
+
+def test_seeds_are_averaged_with_their_spread_and_other_cells_left_alone() -> None:
+    single = [row(age=0.01 * k, seeds=(k,), age_std=None, exact_match=0.1 * k, seconds=10.0) for k in (1, 2, 3)]
+    averaged, other = report.average_seeds([*single, row(test="FAUST 10000", seeds=(0,), age_std=None)])
+    assert averaged.age == pytest.approx(0.02)
+    assert averaged.age_std == pytest.approx(np.std([0.01, 0.02, 0.03], ddof=1))
+    assert (averaged.seeds, averaged.seconds) == ((1, 2, 3), 30.0)
+    assert averaged.exact_match == pytest.approx(0.2)
+    assert (other.test, other.seeds) == ("FAUST 10000", (0,))
+
+
+@pytest.mark.parametrize("change", [{"seeds": (1,)}, {"epochs": 7}, {"protocol": "another"}, {"seeds": ()}])
+def test_rows_that_are_no_repetition_have_no_mean(change: dict[str, object]) -> None:
+    with pytest.raises(DataError, match="have no mean"):
+        report.average_seeds([row(seeds=(1,)), row(**({"seeds": (2,)} | change))])
