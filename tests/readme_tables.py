@@ -25,7 +25,11 @@ PUBLISHED: Published = {
 
 def tables(rows: list[ResultRow]) -> str:
     """Return the paper's errors beside ours, then our rows with their protocol."""
-    return f"{paper_table(rows, PUBLISHED)}\n{markdown_table(rows)}\n{rows[0].protocol}\n"
+    protocols: dict[str, list[str]] = {}
+    for row in rows:
+        protocols.setdefault(row.protocol, []).append(row.test)
+    lines = [f"{', '.join(dict.fromkeys(tests))}: {protocol}" for protocol, tests in protocols.items()]
+    return f"{paper_table(rows, PUBLISHED)}\n{markdown_table(rows)}\n" + "\n\n".join(lines) + "\n"
 
 
 def with_tables(text: str) -> str:

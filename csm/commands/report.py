@@ -88,7 +88,8 @@ def _example(tested: Tested, folder: Path) -> tuple[Figure, Viewer]:
     save_figure(folder / f"map_{tested.row.test}.png", figure)
     caption = (
         f"{tested.row.test}: {source.name} to {target.name}, the pair with the median error of its set "
-        f"({1000 * typical.age:.1f} thousandths of the {normaliser})"
+        f"({1000 * typical.age:.1f} thousandths of the {normaliser}); "
+        "the colours of the errors are heat-method distances at all vertices"
     )
     reference = position_colors(target.mesh)
     viewer = Viewer(
@@ -104,8 +105,9 @@ def _example(tested: Tested, folder: Path) -> tuple[Figure, Viewer]:
 
 
 def _vertex_errors(tested: Tested, source: Shape, target: Shape, indices: IntArray) -> FloatArray:
-    """Measure the map of one pair at every vertex with known truth; NaN elsewhere."""
-    protocol = replace(tested.evaluation.protocol, pairs=((source.name, target.name),), sample=None)
+    """Measure the map of one pair at every vertex with known truth, by the heat method; NaN elsewhere."""
+    pair = (source.name, target.name)
+    protocol = replace(tested.evaluation.protocol, pairs=(pair,), sample=None, points=None, distance="heat")
     again = evaluate_matches([source, target], lambda _a, _b: indices, protocol, progress=False)
     errors = np.full(source.mesh.n_vertices, np.nan)
     both = (source.truth.indices >= 0) & (target.truth.indices >= 0)

@@ -34,6 +34,8 @@ SMALL = [
     "workers=0",
 ]
 
+POINTS = "metric.points=100"  # of the 162: the pictures need all of them, the table does not
+
 
 class Bench:
     """A folder with toy meshes, and a way to run commands in it."""
@@ -67,7 +69,7 @@ def bench(folder, monkeypatch) -> Bench:
 def trained(bench) -> str:
     """Train once; give the checkpoint."""
     if not (bench.folder / "run/model.ckpt").exists():
-        bench.run("train", *SMALL, "data.root=toys", "name=toy", "hydra.run.dir=run", "results=results.json")
+        bench.run("train", *SMALL, "data.root=toys", "name=toy", "hydra.run.dir=run", "results=results.json", POINTS)
     return "run/model.ckpt"
 
 
@@ -82,14 +84,14 @@ def test_training_leaves_a_checkpoint_an_export_rows_curves_and_its_numbers(benc
     assert (row.method, row.train, row.test, row.pairs, row.epochs) == ("toy", "toys", "toys", 2, 60)
     assert row.age == pytest.approx(result["age/toys"])
     assert read_rows(bench.folder / "results.json") == [row]
+    assert {"report.html", "cqc.png", "map_toys.png"} <= {path.name for path in (bench.folder / "run").iterdir()}
     assert (bench.folder / "run/cqc.csv").read_text().startswith("threshold,toys")
 
 
 @pytest.mark.parametrize("checkpoint", ["run/model.ckpt", "run/export/model.json"])
 def test_a_checkpoint_evaluates_to_the_same_numbers_without_its_config(bench, trained, checkpoint):
-    bench.run(
-        "evaluate", f"checkpoint={checkpoint}", "data=folder", "data.root=toys", "data.n_test=2", "hydra.run.dir=eval"
-    )
+    options = ["data=folder", "data.root=toys", "data.n_test=2", "hydra.run.dir=eval", POINTS]
+    bench.run("evaluate", f"checkpoint={checkpoint}", *options)
     assert bench.json("eval/result.json")["age/toys"] == pytest.approx(bench.json("run/result.json")["age/toys"])
 
 
