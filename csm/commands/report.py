@@ -15,6 +15,7 @@ from csm.evaluation.matching import nearest
 from csm.evaluation.protocol import evaluate_matches
 from csm.evaluation.report import ResultRow, add_rows, write_curves_csv, write_rows, write_table_csv
 from csm.evaluation.tables import markdown_table
+from csm.viewer.camera import View, guess_up
 from csm.viewer.colors import position_colors, pull_colors
 from csm.viewer.figures import correspondence_figure, cqc_figure, figure_to_array, save_figure
 from csm.viewer.html import Code, Figure, Panel, Section, Table, Text, Viewer, report_html, write_html
@@ -75,6 +76,12 @@ def _origin(row: ResultRow) -> str:
     return f"Commit {row.commit}. {versions}."
 
 
+def _view(shapes: Sequence[Shape]) -> View:
+    """Look at a set with the axis up that is longest in most of its shapes; arms spread wide mislead only one."""
+    ups = [guess_up(shape.mesh) for shape in shapes]
+    return View(up=max(ups, key=ups.count))
+
+
 def _example(tested: Tested, folder: Path) -> tuple[Figure, Viewer]:
     """Draw the pair with the median error of a test set."""
     pairs = sorted(tested.evaluation.rows, key=lambda row: row.age)
@@ -84,20 +91,22 @@ def _example(tested: Tested, folder: Path) -> tuple[Figure, Viewer]:
     indices = nearest(tested.descriptors[source.name], tested.descriptors[target.name])
     errors = _vertex_errors(tested, source, target, indices)
     normaliser = tested.row.normaliser
-    figure = correspondence_figure(source.mesh, target.mesh, indices, errors, normaliser=normaliser)
+    view = _view(tested.shapes)
+    figure = correspondence_figure(source.mesh, target.mesh, indices, errors, view=view, normaliser=normaliser)
     save_figure(folder / f"map_{tested.row.test}.png", figure)
     caption = (
         f"{tested.row.test}: {source.name} to {target.name}, the pair with the median error of its set "
         f"({1000 * typical.age:.1f} thousandths of the {normaliser}); "
         "the colours of the errors are heat-method distances at all vertices"
     )
-    reference = position_colors(target.mesh)
+    reference = position_colors(target.mesh, up=view.up)
     viewer = Viewer(
         [
             Panel(source.mesh, pull_colors(reference, indices), to_reference=indices, errors=errors),
             Panel(target.mesh, reference),
         ],
         reference=1,
+        view=view,
         error_label=f"geodesic error, fraction of the {normaliser}",
         caption=caption,
     )
