@@ -79,7 +79,7 @@ def _origin(row: ResultRow) -> str:
 def _view(shapes: Sequence[Shape]) -> View:
     """Look at a set with the axis up that is longest in most of its shapes; arms spread wide mislead only one."""
     ups = [guess_up(shape.mesh) for shape in shapes]
-    return View(up=max(ups, key=ups.count))
+    return View(up=max(ups, key=lambda up: ups.count(up)))
 
 
 def _example(tested: Tested, folder: Path) -> tuple[Figure, Viewer]:
