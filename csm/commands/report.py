@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -79,7 +80,8 @@ def _origin(row: ResultRow) -> str:
 def _view(shapes: Sequence[Shape]) -> View:
     """Look at a set with the axis up that is longest in most of its shapes; arms spread wide mislead only one."""
     ups = [guess_up(shape.mesh) for shape in shapes]
-    return View(up=max(ups, key=lambda up: ups.count(up)))
+    ((most_common, _),) = Counter(ups).most_common(1)
+    return View(up=most_common)
 
 
 def _example(tested: Tested, folder: Path) -> tuple[Figure, Viewer]:
