@@ -10,7 +10,7 @@ from omegaconf import DictConfig
 
 from csm.commands.app import command, output_folder
 from csm.commands.report import conclude
-from csm.commands.testing import numbers, protocol_of, test_on
+from csm.commands.testing import numbers, test_all
 from csm.data.datamodule import CorrespondenceDataModule
 from csm.data.store import Store
 from csm.descriptors import from_parameters
@@ -25,10 +25,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
         raise ConfigError("evaluate needs checkpoint=PATH, a .ckpt that csm train wrote")
     module = load_module(Path(cfg.checkpoint))
     datamodule = datamodule_of(cfg, module)
-    tested = [
-        test_on(module, datamodule, shapes, protocol_of(cfg.metric), cfg.table)
-        for shapes in datamodule.test_sets.values()
-    ]
+    tested = test_all(cfg, module, datamodule)
     conclude(tested, output_folder(), cfg.results, f"{cfg.checkpoint}: {module.hparams['training']['protocol']}.")
     return numbers(tested)
 

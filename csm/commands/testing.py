@@ -72,6 +72,12 @@ def test_on(
     return Tested(row, evaluation, [item.shape for item in loaded], descriptors)
 
 
+def test_all(cfg: DictConfig, module: CSMModule, datamodule: CorrespondenceDataModule) -> list[Tested]:
+    """Test on every test set of a data module, by the protocol of the configuration."""
+    protocol = protocol_of(cfg.metric)
+    return [test_on(module, datamodule, shapes, protocol, cfg.table) for shapes in datamodule.test_sets.values()]
+
+
 def numbers(tested: Sequence[Tested]) -> dict[str, float]:
     """Return the errors by test set, flat, for the job's record and for sweep tables."""
     return {

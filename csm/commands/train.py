@@ -15,7 +15,7 @@ from omegaconf import DictConfig, OmegaConf
 
 from csm.commands.app import command, make_datamodule, output_folder
 from csm.commands.report import conclude
-from csm.commands.testing import numbers, protocol_of, test_on
+from csm.commands.testing import numbers, test_all
 from csm.data.datamodule import CorrespondenceDataModule
 from csm.errors import ConfigError
 from csm.evaluation.provenance import provenance
@@ -32,10 +32,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     module, found = fit(cfg, datamodule, folder)
     if not cfg.test:
         return found
-    tested = [
-        test_on(module, datamodule, shapes, protocol_of(cfg.metric), cfg.table)
-        for shapes in datamodule.test_sets.values()
-    ]
+    tested = test_all(cfg, module, datamodule)
     conclude(tested, folder, cfg.results, f"{cfg.name}: {module.hparams['training']['protocol']}.")
     if cfg.logger:
         print(f"TensorBoard:  tensorboard --logdir {folder}")
