@@ -15,7 +15,7 @@ from csm.data.datamodule import CorrespondenceDataModule
 from csm.data.prepare import Job
 from csm.data.shapeset import Shape, ShapeSet
 from csm.errors import ConfigError
-from csm.evaluation.matching import nearest_at
+from csm.evaluation.matching import nearest
 from csm.evaluation.protocol import Protocol, evaluate_matches
 from csm.evaluation.provenance import provenance
 from csm.evaluation.report import ResultRow, result_row
@@ -55,7 +55,7 @@ def test_on(
     }
 
     def match(source: Shape, target: Shape) -> IntArray:
-        return nearest_at(descriptors[source.name], descriptors[target.name], source.truth.known)
+        return nearest(descriptors[source.name], descriptors[target.name], at=source.truth.known)
 
     evaluation = evaluate_matches([item.shape for item in loaded], match, protocol)
     training = module.hparams["training"]

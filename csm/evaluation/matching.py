@@ -46,7 +46,7 @@ def match_features(source: Rows, target: Rows, *, source_name: str = "", target_
     return Match(nearest(source, target), len(target), source_name, target_name)
 
 
-def nearest(queries: Rows, candidates: Rows, *, block: int = 2048) -> IntArray:
+def nearest(queries: Rows, candidates: Rows, *, at: IntArray | None = None, block: int = 256) -> IntArray:
     """Find the nearest candidate (Euclidean) of each query, in blocks of bounded memory.
 
     float32 rows are compared by float32 products first; queries for which rounding could decide are done again in
@@ -59,6 +59,9 @@ def nearest(queries: Rows, candidates: Rows, *, block: int = 2048) -> IntArray:
         Shape (N, Q), numpy or torch, float32 or float64 (others are taken as float32).
     candidates
         Shape (N', Q), the same kind of number.
+    at
+        Numbers of the queries that are asked for, such as the vertices with known ground truth; the others get -1.
+        None for all.
     block
         Queries at a time; fewer when N' is so large that a block of distances would exceed 2^25 numbers.
 
@@ -80,6 +83,10 @@ def nearest(queries: Rows, candidates: Rows, *, block: int = 2048) -> IntArray:
     q, c = _tensor(queries), _tensor(candidates)
     if q.ndim != 2 or c.ndim != 2 or q.shape[1] != c.shape[1] or len(c) == 0:
         raise ConfigError(f"nearest: {tuple(q.shape)} against {tuple(c.shape)}; wanted (N, Q) and (N', Q) with N' > 0")
+    if at is not None:
+        found = np.full(len(q), -1, dtype=np.int64)
+        found[at] = nearest(q[torch.as_tensor(at, device=q.device)], c, block=block)
+        return found
     if q.dtype != c.dtype:
         q, c = q.double(), c.double()
     with torch.no_grad():
@@ -88,23 +95,10 @@ def nearest(queries: Rows, candidates: Rows, *, block: int = 2048) -> IntArray:
                 "nearest: a descriptor is not finite, so it has no nearest neighbour; look at the features"
             )
         centre = c.mean(0)
-        found, unsure = _search(q - centre, c - centre, block)
+        first, unsure = _search(q - centre, c - centre, block)
         if c.dtype != torch.float64 and unsure.any():
-            found[unsure] = _search(q[unsure].double() - centre, c.double() - centre, block)[0]
-    return found.cpu().numpy()
-
-
-def nearest_at(queries: Rows, candidates: Rows, at: IntArray, *, block: int = 2048) -> IntArray:
-    """Find the nearest candidate of the queries numbered `at` only; the others get -1.
-
-    An evaluation needs the vertices with known ground truth, which on a fine mesh may be few.  Shapes and errors are
-    those of `nearest`.
-    """
-    found = np.full(len(queries), -1, dtype=np.int64)
-    found[at] = nearest(
-        queries[torch.as_tensor(at) if isinstance(queries, torch.Tensor) else at], candidates, block=block
-    )
-    return found
+            first[unsure] = _search(q[unsure].double() - centre, c.double() - centre, block)[0]
+    return first.cpu().numpy()
 
 
 def _tensor(rows: Rows) -> torch.Tensor:
@@ -114,16 +108,23 @@ def _tensor(rows: Rows) -> torch.Tensor:
 
 def _search(q: torch.Tensor, c: torch.Tensor, block: int) -> tuple[torch.Tensor, torch.Tensor]:
     """Return the first candidate within rounding of the nearest, and whether there are others."""
-    rows = max(1, min(block, _MAX_ELEMENTS // len(c)))
+    rows = max(1, min(block, len(q), _MAX_ELEMENTS // len(c)))
     half_norms = 0.5 * c.square().sum(1)
-    rounding = 4.0 * c.shape[1] ** 0.5 * torch.finfo(c.dtype).eps * half_norms.max().sqrt()
-    found = torch.empty(len(q), dtype=torch.int64, device=q.device)
-    unsure = torch.empty(len(q), dtype=torch.bool, device=q.device)
+    largest = half_norms.max().sqrt()
+    rounding = 4.0 * c.shape[1] ** 0.5 * torch.finfo(c.dtype).eps * largest * (q.norm(dim=1) + largest)
+    first = torch.empty(len(q), dtype=torch.int64, device=q.device)
+    several = torch.empty(len(q), dtype=torch.bool, device=q.device)
+    scores = torch.empty(rows, len(c), dtype=c.dtype, device=c.device)  # one piece of memory that stays in the cache
     for begin in range(0, len(q), rows):
-        part = q[begin : begin + rows]
-        score = torch.addmm(half_norms, part, c.T, alpha=-1.0)  # half the squared distance, less |q|^2 / 2
-        limit = score.amin(1) + rounding * (part.norm(dim=1) + half_norms.max().sqrt())
-        close = score <= limit[:, None]
-        found[begin : begin + rows] = close.to(torch.uint8).argmax(1)
-        unsure[begin : begin + rows] = close.sum(1) > 1
-    return found, unsure
+        here = slice(begin, begin + rows)
+        part = q[here]
+        # Half the squared distance, less |q|^2 / 2.
+        score = torch.addmm(half_norms, part, c.T, alpha=-1.0, out=scores[: len(part)])
+        least, first[here] = score.min(1)
+        limit = least + rounding[here]
+        score.scatter_(1, first[here, None], torch.inf)
+        several[here] = score.amin(1) <= limit
+        tied = several[here].nonzero()[:, 0]
+        others = (score[tied] <= limit[tied, None]).to(torch.uint8).argmax(1)
+        first[begin + tied] = torch.minimum(first[begin + tied], others)
+    return first, several

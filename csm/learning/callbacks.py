@@ -10,7 +10,7 @@ from torch import Tensor
 from csm._types import IntArray
 from csm.data.datamodule import CorrespondenceDataModule
 from csm.data.shapeset import Shape
-from csm.evaluation.matching import nearest_at
+from csm.evaluation.matching import nearest
 from csm.evaluation.protocol import Protocol, evaluate_matches
 from csm.evaluation.results import Evaluation
 
@@ -53,7 +53,7 @@ class ValidationErrors(L.Callback):
         shapes = [shape for shape in datamodule.validation_shapes() if shape.name in found]
 
         def match(source: Shape, target: Shape) -> IntArray:
-            return nearest_at(found[source.name], found[target.name], source.truth.known)
+            return nearest(found[source.name], found[target.name], at=source.truth.known)
 
         self.latest = evaluate_matches(shapes, match, self.protocol, progress=False)
         pl_module.log("val/age", self.latest.summary["age"], prog_bar=True)

@@ -9,7 +9,7 @@ from scipy.spatial.distance import cdist
 
 from csm.errors import ConfigError
 from csm.evaluation import matching
-from csm.evaluation.matching import match_features, nearest, nearest_at
+from csm.evaluation.matching import match_features, nearest
 
 
 def features(n: int, width: int, seed: int) -> np.ndarray:
@@ -46,6 +46,16 @@ def test_ties_go_to_the_lowest_index(block: int) -> None:
     assert nearest(np.zeros((7, 2)), np.zeros((9, 2))).tolist() == [0] * 7
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_the_lowest_of_several_nearest_is_found_wherever_the_others_lie(dtype: type) -> None:
+    """Rounding may favour any copy of the nearest row, so the least score alone does not say which is first."""
+    c = features(40, 64, 0).astype(dtype)
+    copies = np.concatenate([c, c[::-1], c])
+    q = c + dtype(0.1) * features(40, 64, 1).astype(dtype)
+    for block in (1, 3, 40):
+        assert nearest(q, copies, block=block).tolist() == list(range(40))
+
+
 def test_memory_is_bounded_whatever_the_size(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[int] = []
     product = torch.addmm
@@ -66,9 +76,10 @@ def test_only_the_vertices_asked_for() -> None:
     q, c = features(30, 5, 0), features(20, 5, 1)
     at = np.array([3, 17, 4])
     for rows in (q, torch.from_numpy(q)):
-        found = nearest_at(rows, c, at)
+        found = nearest(rows, c, at=at)
         assert found[at].tolist() == nearest(q, c)[at].tolist()
         assert (np.delete(found, at) == -1).all()
+    assert (nearest(q, c, at=np.array([], dtype=int)) == -1).all()
 
 
 def test_match_knows_its_coverage_and_names() -> None:
