@@ -1,0 +1,106 @@
+"""Time and memory of the nearest neighbours in descriptor space against PyTorch's and SciPy's, all in this run.
+
+    python benchmarks/matching.py --threads 1
+
+One pass matches two shapes of FAUST's size by descriptors of a trained network's width, smooth along the surface; one
+row in twenty has a near copy, as left and right of a body do.  The variants take turns; the time is the median, the
+ratio the reference's time over the variant's.  Peak memory is what a fresh process needs beyond its inputs.  A match is
+wrong if it is farther than the nearest row by float64 differences (relative 1e-9, so that ties count as right).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+import torch
+from measuring import growth_megabytes, median_milliseconds, options, peak_megabytes, write
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
+from torch.nn import functional as F
+
+from csm.evaluation.matching import nearest
+
+N, D = 6890, 256
+REFERENCE = "torch.cdist + argmin"
+FREQUENCY, NEAR_COPIES = 8.0, N // 20
+
+Rows = NDArray[np.float32]
+Matcher = Callable[[Rows, Rows], NDArray[np.int64]]
+
+
+@dataclass(frozen=True)
+class Row:
+    """What was measured of one variant."""
+
+    variant: str
+    milliseconds: float
+    speedup: float
+    megabytes: float
+    wrong: float
+
+
+def by_cdist(queries: Rows, candidates: Rows) -> NDArray[np.int64]:
+    return torch.cdist(torch.from_numpy(queries), torch.from_numpy(candidates)).argmin(1).numpy()
+
+
+def by_tree(queries: Rows, candidates: Rows) -> NDArray[np.int64]:
+    return cKDTree(candidates).query(queries, workers=torch.get_num_threads())[1]
+
+
+VARIANTS: dict[str, Matcher] = {REFERENCE: by_cdist, "scipy cKDTree": by_tree, "csm nearest": nearest}
+
+
+def problem() -> list[Rows]:
+    """Return two shapes' descriptors, (N, D) each: one smooth function of the sphere at two samples of its points."""
+    torch.manual_seed(0)
+    waves, phases = FREQUENCY * torch.randn(3, D), 2 * torch.pi * torch.rand(D)
+    shapes = []
+    for _ in range(2):
+        points = F.normalize(torch.randn(N, 3))
+        points[:NEAR_COPIES] = points[-NEAR_COPIES:] + 1e-5 * torch.randn(NEAR_COPIES, 3)
+        shapes.append(torch.addmm(phases, points, waves).cos_().numpy())
+    return shapes
+
+
+def wrong(found: NDArray[np.int64], queries: Rows, candidates: Rows) -> float:
+    """Return the fraction of queries with a nearer candidate than the one found."""
+    q, c = queries.astype(np.float64), candidates.astype(np.float64)
+    least = np.concatenate([cdist(part, c).min(1) for part in np.array_split(q, 16)])
+    return float((np.linalg.norm(q - c[found], axis=1) > least * (1 + 1e-9)).mean())
+
+
+def own_peak(variant: str) -> float:
+    """Return what one pass needs; a tiny pass first loads the libraries."""
+    queries, candidates = problem()
+    VARIANTS[variant](queries[:8], candidates[:8])
+    return growth_megabytes(lambda: VARIANTS[variant](queries, candidates))
+
+
+def measure(repeats: int, threads: int) -> list[Row]:
+    # First, while this process is small: on Linux a child starts with its parent's peak.
+    peaks = {variant: peak_megabytes(variant, threads) for variant in VARIANTS}
+    queries, candidates = problem()
+    errors = {variant: wrong(match(queries, candidates), queries, candidates) for variant, match in VARIANTS.items()}
+    median = median_milliseconds({v: partial(match, queries, candidates) for v, match in VARIANTS.items()}, repeats)
+    return [Row(v, median[v], median[REFERENCE] / median[v], peaks[v], errors[v]) for v in VARIANTS]
+
+
+def main() -> None:
+    chosen = options("matching", __doc__, list(VARIANTS), repeats=7)
+    if chosen.peak_of:
+        print(own_peak(chosen.peak_of))
+        return
+    rows = measure(chosen.repeats, chosen.threads)
+    print(f"{N} queries, {N} candidates, {D} channels, {chosen.threads} threads, median of {chosen.repeats}\n")
+    print(f"{'':<24}{'ms':>8}{'speed-up':>10}{'MB':>8}{'wrong':>10}")
+    for row in rows:
+        print(f"{row.variant:<24}{row.milliseconds:>8.0f}{row.speedup:>10.2f}{row.megabytes:>8.0f}{row.wrong:>10.2%}")
+    write("matching", chosen, {"n": N, "d": D}, rows)
+
+
+if __name__ == "__main__":
+    main()
