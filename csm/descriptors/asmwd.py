@@ -40,7 +40,7 @@ class ASMWD:
         S, the low-pass function and S - 1 wavelets per angle, at least 2.
     normalise
         Scale each row to unit length.
-    frame, sweeps
+    frame, sweeps, smoothing
         Of `csm.operators.frames.face_frames`.
 
     Raises
@@ -70,6 +70,7 @@ class ASMWD:
     normalise: bool = True
     frame: FrameKind = "line_field"
     sweeps: int = 3
+    smoothing: float = 0.08
 
     name: ClassVar[str] = "asmwd"
 
@@ -102,7 +103,7 @@ class ASMWD:
     def _spectrum(self, operators: Operators, theta: float) -> Spectrum:
         if self.alpha == 0:
             return operators.lbo(self.k)
-        return operators.albo(self.alpha, theta, self.k, frame=self.frame, sweeps=self.sweeps)
+        return operators.albo(self.alpha, theta, self.k, frame=self.frame, sweeps=self.sweeps, smoothing=self.smoothing)
 
 
 def meyer_block(spectrum: Spectrum, n_filters: int) -> FloatArray:

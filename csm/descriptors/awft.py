@@ -50,7 +50,7 @@ class AWFT:
         was not published, and 0 is what the inventors of geometry vectors use.
     index_sweeps
         Smoothing sweeps of the shape index.
-    frame, sweeps
+    frame, sweeps, smoothing
         Of `csm.operators.frames.face_frames` (the published code has frames of its own kind and 10 sweeps).
 
     Raises
@@ -87,6 +87,7 @@ class AWFT:
     index_sweeps: int = 10
     frame: FrameKind = "line_field"
     sweeps: int = 3
+    smoothing: float = 0.08
 
     name: ClassVar[str] = "awft"
 
@@ -132,4 +133,6 @@ class AWFT:
         if which.alpha == 0:
             return operators.lbo(self.k)
         theta = float(np.radians(which.degrees))
-        return operators.albo(which.alpha, theta, self.k, frame=self.frame, sweeps=self.sweeps)
+        return operators.albo(
+            which.alpha, theta, self.k, frame=self.frame, sweeps=self.sweeps, smoothing=self.smoothing
+        )

@@ -36,7 +36,7 @@ class ACD:
         D, so each angle has the D + 1 columns T_0 .. T_D.
     normalise
         Scale each row to unit length.
-    frame, sweeps
+    frame, sweeps, smoothing
         Of `csm.operators.frames.face_frames`.
 
     Raises
@@ -65,6 +65,7 @@ class ACD:
     normalise: bool = False
     frame: FrameKind = "line_field"
     sweeps: int = 3
+    smoothing: float = 0.08
 
     name: ClassVar[str] = "acd"
 
@@ -102,7 +103,7 @@ class ACD:
     def _spectrum(self, operators: Operators, theta: float) -> Spectrum:
         if self.alpha == 0:
             return operators.lbo(self.k)
-        return operators.albo(self.alpha, theta, self.k, frame=self.frame, sweeps=self.sweeps)
+        return operators.albo(self.alpha, theta, self.k, frame=self.frame, sweeps=self.sweeps, smoothing=self.smoothing)
 
 
 def chebyshev_block(spectrum: Spectrum, order: int) -> FloatArray:

@@ -62,7 +62,7 @@ class Operators:
         self.mesh = mesh.unit_area() if unit_area else mesh
         self._memo = memo
         self._areas: FloatArray | None = None
-        self._anisotropic: dict[tuple[FrameKind, int], AnisotropicStiffness] = {}
+        self._anisotropic: dict[tuple[FrameKind, int, float], AnisotropicStiffness] = {}
         self._spectra: dict[tuple[str, tuple[tuple[str, Any], ...]], Spectrum] = {}
 
     @property
@@ -72,28 +72,46 @@ class Operators:
             self._areas = vertex_areas(self.mesh)
         return self._areas
 
-    def anisotropic(self, *, frame: FrameKind = "line_field", sweeps: int = 3) -> AnisotropicStiffness:
+    def anisotropic(
+        self, *, frame: FrameKind = "line_field", sweeps: int = 3, smoothing: float = 0.08
+    ) -> AnisotropicStiffness:
         """Return the stiffness of every strength and angle for one choice of frames."""
-        key = (frame, sweeps)
+        key = (frame, sweeps, smoothing)
         if key not in self._anisotropic:
-            self._anisotropic[key] = anisotropic_stiffness(
-                self.mesh, face_frames(self.mesh, frame=frame, sweeps=sweeps)
-            )
+            frames = face_frames(self.mesh, frame=frame, sweeps=sweeps, smoothing=smoothing)
+            self._anisotropic[key] = anisotropic_stiffness(self.mesh, frames)
         return self._anisotropic[key]
 
     def lbo(self, k: int) -> Spectrum:
         """Return the `k` smallest eigenpairs of the isotropic Laplacian."""
         return self._spectrum("lbo", {"k": int(k)}, lambda: self._solve(stiffness(self.mesh), k))
 
-    def albo(self, alpha: float, theta: float, k: int, *, frame: FrameKind = "line_field", sweeps: int = 3) -> Spectrum:
+    def albo(
+        self,
+        alpha: float,
+        theta: float,
+        k: int,
+        *,
+        frame: FrameKind = "line_field",
+        sweeps: int = 3,
+        smoothing: float = 0.08,
+    ) -> Spectrum:
         """Return the `k` smallest eigenpairs of the anisotropic Laplacian of strength `alpha` and angle `theta`.
 
-        `frame` and `sweeps` are those of `csm.operators.frames.face_frames`; `theta` is in radians, of period pi.
+        `frame`, `sweeps` and `smoothing` are those of `csm.operators.frames.face_frames`; `theta` is in radians, of
+        period pi.
         """
-        params = {"alpha": float(alpha), "theta": float(theta), "k": int(k), "frame": str(frame), "sweeps": int(sweeps)}
+        params = {
+            "alpha": float(alpha),
+            "theta": float(theta),
+            "k": int(k),
+            "frame": str(frame),
+            "sweeps": int(sweeps),
+            "smoothing": float(smoothing),
+        }
 
         def solve() -> Spectrum:
-            return self._solve(self.anisotropic(frame=frame, sweeps=sweeps).at(alpha, theta), k)
+            return self._solve(self.anisotropic(frame=frame, sweeps=sweeps, smoothing=smoothing).at(alpha, theta), k)
 
         return self._spectrum("albo", params, solve)
 

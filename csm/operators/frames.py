@@ -1,8 +1,9 @@
 """The line field of principal curvature directions: one tangent frame per triangle.
 
 Curvature is estimated from the dihedral angles of the edges (the normal-cycle tensor of Cohen-Steiner and Morvan,
-SoCG 2003), smoothed over the 1-ring, and read off in the plane of every face.  A principal direction has no sign, so
-the default averages lines, not vectors; `frame="released"` averages vectors as the published ACD code does.
+SoCG 2003).  Two kinds of frame smooth it over the 1-ring, as the published ACD code does, and read it off in the plane
+of every face: `"line_field"` averages lines, because a principal direction has no sign; `"released"` averages vectors
+as that code does.  `"smooth"` is csm's own: a line field on the surface, smoothed over a length.
 """
 
 from __future__ import annotations
@@ -13,11 +14,13 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 from scipy import sparse
 
-from csm._types import FloatArray, IntArray
+from csm._types import ComplexArray, FloatArray
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
+from csm.operators._edges import dot, interior_edges, longest_edge_basis, unit
+from csm.operators.linefield import smooth_line_field
 
-FrameKind: TypeAlias = Literal["line_field", "released"]
+FrameKind: TypeAlias = Literal["line_field", "smooth", "released"]
 
 _FLAT = 1e-9  # tensors below this (radians, edge lengths relative to the mean) are rounding, not curvature
 _UMBILIC = 1e-7  # principal curvatures closer than this, relative to the tensor, have no directions
@@ -37,7 +40,8 @@ class FaceFrames:
     coherence
         Shape (M,), from 0 (the three corners disagree, or the face is flat or umbilic: the frame then follows the
         face's longest edge) to 1 (they agree).  Of the three lines, the difference of the eigenvalues of the sum of
-        u u^T over their sum; of the released vectors, the length of their mean.
+        u u^T over their sum; of the released vectors, the length of their mean; of the smooth field, how far the
+        curvature lines within the smoothing length agree.
 
     Notes
     -----
@@ -49,7 +53,7 @@ class FaceFrames:
     coherence: FloatArray
 
 
-def face_frames(mesh: Mesh, *, frame: FrameKind = "line_field", sweeps: int = 3) -> FaceFrames:
+def face_frames(mesh: Mesh, *, frame: FrameKind = "line_field", sweeps: int = 3, smoothing: float = 0.08) -> FaceFrames:
     """Return the principal frame of every face.
 
     Parameters
@@ -59,15 +63,19 @@ def face_frames(mesh: Mesh, *, frame: FrameKind = "line_field", sweeps: int = 3)
     frame
         ``"line_field"``: at each corner of a face, the principal line of that vertex's tensor within the face plane;
         the three lines are averaged without sign (leading eigenvector of the sum of u u^T).  Unchanged by rigid
-        motions and scale.  ``"released"``: the authors' average of three signed eigenvectors, whose signs LAPACK
-        chooses; it depends on the world axes and exists to reproduce published numbers.
+        motions and scale.  ``"smooth"``: `csm.operators.linefield.smooth_line_field`, whose smoothing does not
+        depend on the resolution; unchanged by rigid motions and scale too.  ``"released"``: the authors' average of
+        three signed eigenvectors, whose signs LAPACK chooses; it depends on the world axes and exists to reproduce
+        published numbers.
     sweeps
-        Number of smoothing sweeps over the 1-ring (10 in the released code).
+        Number of smoothing sweeps over the 1-ring (10 in the released code), for the frames other than "smooth".
+    smoothing
+        Smoothing length of the "smooth" frame, in units of the square root of the surface area.
 
     Raises
     ------
     ConfigError
-        If `frame` is unknown or `sweeps` is negative.
+        If `frame` is unknown, or `sweeps` or `smoothing` is negative.
 
     Notes
     -----
@@ -79,6 +87,8 @@ def face_frames(mesh: Mesh, *, frame: FrameKind = "line_field", sweeps: int = 3)
         raise ConfigError(f"frame is {frame!r}, wanted one of {', '.join(get_args(FrameKind))}")
     if sweeps < 0:
         raise ConfigError(f"sweeps is {sweeps}, wanted 0 or more")
+    if frame == "smooth":
+        return _from_angles(mesh, smooth_line_field(mesh, smoothing))
     tensors = smooth(mesh, edge_tensors(mesh), sweeps)
     return _line_field(mesh, tensors) if frame == "line_field" else _released(mesh, tensors)
 
@@ -90,13 +100,9 @@ def edge_tensors(mesh: Mesh) -> FloatArray:
     the unit edge and convex angles are positive.  Its large eigenvalue lies *along* a crease, so its eigenvectors are
     the principal directions with their roles exchanged.
     """
-    edges = _interior_edges(mesh)
-    span = mesh.vertices[edges.head] - mesh.vertices[edges.tail]
-    length = np.linalg.norm(span, axis=1)
-    tangent = _unit(span)
-    left, right = (_unit(mesh.face_crosses)[f] for f in (edges.left, edges.right))
-    angle = np.arctan2(_dot(np.cross(left, right), tangent), _dot(left, right))
-    weight = angle * length / max(length.mean(), np.finfo(float).tiny) if len(length) else angle
+    edges = interior_edges(mesh)
+    length, tangent = edges.length, edges.tangent
+    weight = edges.angle * length / max(length.mean(), np.finfo(float).tiny) if len(length) else edges.angle
     contribution = (weight[:, None, None] * tangent[:, :, None] * tangent[:, None, :]).reshape(-1, 9)
     ends = np.concatenate([edges.tail, edges.head])
     incidence = sparse.csr_array(
@@ -122,27 +128,35 @@ def smooth(mesh: Mesh, tensors: FloatArray, sweeps: int) -> FloatArray:
 
 
 def _line_field(mesh: Mesh, tensors: FloatArray) -> FaceFrames:
-    e1, e2 = _longest_edge_basis(mesh)
-    sum_cos, sum_sin = np.zeros(mesh.n_faces), np.zeros(mesh.n_faces)
+    basis = longest_edge_basis(mesh)
+    total = np.zeros(mesh.n_faces, dtype=np.complex128)
     for corner in range(3):
-        cos2, sin2 = _greatest_curvature_line(tensors[mesh.faces[:, corner]], e1, e2)
-        sum_cos += cos2
-        sum_sin += sin2
-    coherence = np.hypot(sum_cos, sum_sin) / 3
-    undecided = (coherence < _UMBILIC) | (np.abs(e2).max(axis=1) == 0)
-    half = 0.5 * np.arctan2(np.where(undecided, 0.0, sum_sin), np.where(undecided, 1.0, sum_cos))
+        total += _greatest_curvature_line(tensors[mesh.faces[:, corner]], basis.e1, basis.e2)
+    return _from_angles(mesh, total / 3)
+
+
+def _from_angles(mesh: Mesh, line: ComplexArray) -> FaceFrames:
+    """Return the frames whose v has half the argument of `line`, (M,), in the longest-edge basis."""
+    basis, coherence = longest_edge_basis(mesh), np.abs(line)
+    undecided = (coherence < _UMBILIC) | (np.abs(basis.e2).max(axis=1) == 0)
+    half = 0.5 * np.angle(np.where(undecided, 1.0, line))
     cos, sin = np.cos(half)[:, None], np.sin(half)[:, None]
-    return FaceFrames(u=sin * e1 - cos * e2, v=cos * e1 + sin * e2, coherence=np.where(undecided, 0.0, coherence))
+    return FaceFrames(
+        u=sin * basis.e1 - cos * basis.e2,
+        v=cos * basis.e1 + sin * basis.e2,
+        coherence=np.where(undecided, 0.0, coherence),
+    )
 
 
-def _greatest_curvature_line(tensors: FloatArray, e1: FloatArray, e2: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return (cos, sin) of twice the angle from e1 to the line of the *smaller* eigenvalue, (0, 0) if there is none."""
+def _greatest_curvature_line(tensors: FloatArray, e1: FloatArray, e2: FloatArray) -> ComplexArray:
+    """Return exp(2i angle) from e1 to the line of the *smaller* eigenvalue, 0 where there is none."""
     t1, t2 = (np.einsum("mij,mj->mi", tensors, e) for e in (e1, e2))
-    difference, mixed = _dot(e1, t1) - _dot(e2, t2), 2 * _dot(e1, t2)
+    difference, mixed = dot(e1, t1) - dot(e2, t2), 2 * dot(e1, t2)
     gap = np.hypot(difference, mixed)
     defined = gap > _FLAT + _UMBILIC * np.linalg.norm(tensors, axis=(1, 2))
     scale = np.where(defined, -1.0 / np.where(defined, gap, 1.0), 0.0)
-    return difference * scale, mixed * scale
+    line: ComplexArray = (difference + 1j * mixed) * scale
+    return line
 
 
 def _released(mesh: Mesh, tensors: FloatArray) -> FaceFrames:
@@ -153,53 +167,16 @@ def _released(mesh: Mesh, tensors: FloatArray) -> FaceFrames:
     swap = (values[:, 1] > values[:, 2])[:, None]
     u_min = np.where(swap, vectors[:, :, 1], vectors[:, :, 2])
     u_max = np.where(swap, vectors[:, :, 2], vectors[:, :, 1])
-    u_max = u_max * np.where(_dot(np.cross(u_min, u_max), _vertex_normals(mesh)) < 0, -1.0, 1.0)[:, None]
+    u_max = u_max * np.where(dot(np.cross(u_min, u_max), _vertex_normals(mesh)) < 0, -1.0, 1.0)[:, None]
     mean = u_max[mesh.faces].mean(axis=1)
-    normal = _unit(mesh.face_crosses)
-    v = _unit(mean - _dot(mean, normal)[:, None] * normal)
+    normal = unit(mesh.face_crosses)
+    v = unit(mean - dot(mean, normal)[:, None] * normal)
     undecided = (np.abs(v).max(axis=1) == 0) | (np.abs(normal).max(axis=1) == 0)
-    v = np.where(undecided[:, None], _longest_edge_basis(mesh)[0], v)
+    v = np.where(undecided[:, None], longest_edge_basis(mesh).e1, v)
     return FaceFrames(u=np.cross(v, normal), v=v, coherence=np.linalg.norm(mean, axis=1))
 
 
 def _vertex_normals(mesh: Mesh) -> FloatArray:
     total = np.zeros_like(mesh.vertices)
-    np.add.at(total, mesh.faces.ravel(), np.repeat(_unit(mesh.face_crosses), 3, axis=0))
+    np.add.at(total, mesh.faces.ravel(), np.repeat(unit(mesh.face_crosses), 3, axis=0))
     return total
-
-
-def _longest_edge_basis(mesh: Mesh) -> tuple[FloatArray, FloatArray]:
-    """Return e1 along each face's longest edge and e2 with (e1, e2, normal) right-handed; e2 = 0 without area."""
-    edges = mesh.corners[:, [1, 2, 0]] - mesh.corners
-    lengths = np.linalg.norm(edges, axis=2)
-    first_longest = np.argmax(lengths >= lengths.max(axis=1, keepdims=True) * (1 - 1e-6), axis=1)
-    e1 = _unit(edges[np.arange(mesh.n_faces), first_longest])
-    return e1, np.cross(_unit(mesh.face_crosses), e1)
-
-
-@dataclass(frozen=True, eq=False)
-class _InteriorEdges:
-    tail: IntArray  # (E,) the face `left` runs from tail to head
-    head: IntArray
-    left: IntArray
-    right: IntArray
-
-
-def _interior_edges(mesh: Mesh) -> _InteriorEdges:
-    """Return the edges that have exactly two faces."""
-    tail, head = mesh.faces.ravel(), mesh.faces[:, [1, 2, 0]].ravel()
-    key = np.minimum(tail, head) * mesh.n_vertices + np.maximum(tail, head)
-    order = np.argsort(key, kind="stable")
-    _, start, count = np.unique(key[order], return_index=True, return_counts=True)
-    first, second = order[start[count == 2]], order[start[count == 2] + 1]
-    return _InteriorEdges(tail=tail[first], head=head[first], left=first // 3, right=second // 3)
-
-
-def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
-    product: FloatArray = np.einsum("ij,ij->i", a, b)
-    return product
-
-
-def _unit(vectors: FloatArray) -> FloatArray:
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return vectors / np.where(length > 0, length, 1.0)

@@ -22,7 +22,7 @@ def lines(directions: np.ndarray) -> np.ndarray:
     return directions[:, :, None] * directions[:, None, :]
 
 
-@pytest.mark.parametrize("frame", ["line_field", "released"])
+@pytest.mark.parametrize("frame", ["line_field", "smooth", "released"])
 @pytest.mark.parametrize("mesh", SHAPES, ids=lambda m: m.name)
 def test_frames_are_right_handed_and_orthonormal(mesh, frame):
     frames = face_frames(mesh, frame=frame)
@@ -166,14 +166,14 @@ def test_line_average_is_the_leading_eigenvector_of_the_corner_lines():
 
 def test_face_without_area_gets_its_longest_edge():
     mesh = Mesh(np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 1, 1.0]]), np.array([[0, 1, 2], [0, 3, 1], [1, 3, 2]]))
-    for frame in ("line_field", "released"):
+    for frame in ("line_field", "smooth", "released"):
         frames = face_frames(mesh, frame=frame)
         np.testing.assert_allclose(np.abs(frames.v[0]), [1, 0, 0], atol=1e-12)
         np.testing.assert_array_equal(frames.u[0], 0)
         assert np.isfinite(frames.v).all()
 
 
-@pytest.mark.parametrize("wrong", [{"frame": "curly"}, {"sweeps": -1}])
+@pytest.mark.parametrize("wrong", [{"frame": "curly"}, {"sweeps": -1}, {"frame": "smooth", "smoothing": -0.1}])
 def test_unknown_settings_are_refused(wrong):
     with pytest.raises(ConfigError, match="wanted"):
         face_frames(sphere(1), **wrong)
