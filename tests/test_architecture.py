@@ -24,7 +24,8 @@ ROOMS = {
     "evaluation": {"mesh", "operators", "data"},
     "viewer": {"mesh", "evaluation"},
     "learning": {"mesh", "operators", "descriptors", "data", "networks", "evaluation", "viewer"},
-    "commands": {"mesh", "operators", "descriptors", "data", "networks", "evaluation", "viewer", "learning"},
+    "studies": {"mesh", "operators", "descriptors", "data", "networks", "evaluation", "viewer", "learning"},
+    "commands": {"mesh", "operators", "descriptors", "data", "networks", "evaluation", "viewer", "learning", "studies"},
 }
 """The rooms of csm, each with those it may import besides itself; left to right, never back."""
 
@@ -38,6 +39,7 @@ FORBIDDEN = {
     "evaluation": CONFIGURATION | {"lightning"},
     "viewer": CONFIGURATION | {"lightning"},
     "learning": CONFIGURATION,
+    "studies": CONFIGURATION,
 }
 """Libraries that a room does without."""
 
