@@ -12,7 +12,7 @@ from tqdm import tqdm
 
 from csm._types import IntArray
 from csm.data.datamodule import CorrespondenceDataModule
-from csm.data.prepare import Job
+from csm.data.prepare import Job, processes
 from csm.data.shapeset import Shape, ShapeSet
 from csm.errors import ConfigError
 from csm.evaluation.matching import nearest
@@ -57,7 +57,8 @@ def test_on(
     def match(source: Shape, target: Shape) -> IntArray:
         return nearest(descriptors[source.name], descriptors[target.name], at=source.truth.known)
 
-    evaluation = evaluate_matches([item.shape for item in loaded], match, protocol)
+    workers = processes(datamodule.workers, len(names))
+    evaluation = evaluate_matches([item.shape for item in loaded], match, protocol, workers=workers)
     training = module.hparams["training"]
     row = result_row(
         [evaluation],

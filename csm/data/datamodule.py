@@ -79,7 +79,7 @@ class CorrespondenceDataModule(L.LightningDataModule):
     store
         Where features and bases are kept.
     workers
-        Processes for the preparation, see `csm.data.prepare.prepare`.
+        Processes for the preparation and for the distances of tests, see `csm.data.prepare.processes`.
     """
 
     def __init__(

@@ -112,6 +112,17 @@ def _prepare_one(job: Job, recipe: Recipe, root: str) -> tuple[str, str]:
     return ("made" if store.computed else "present"), ""
 
 
+def processes(workers: int | None, n_jobs: int) -> int:
+    """Return how many processes to start: as many as asked for; by default one per core, none for fewer than 3 jobs.
+
+    Examples
+    --------
+    >>> processes(None, 2), processes(4, 2)
+    (0, 4)
+    """
+    return workers if workers is not None else (os.cpu_count() or 1) if n_jobs > 2 else 0
+
+
 def prepare(
     jobs: Sequence[Job], recipe: Recipe, store: Store, *, workers: int | None = None, progress: bool = True
 ) -> Summary:
@@ -126,7 +137,7 @@ def prepare(
     store
         Where it goes.
     workers
-        Processes, each with one BLAS thread; by default one per core, and none for fewer than three shapes.
+        Processes, each with one BLAS thread; see `processes`.
     progress
         Show a progress bar with the shape's name and the estimated time left.
 
@@ -135,10 +146,9 @@ def prepare(
     Summary
         Failures are listed there, not raised.
     """
-    workers = workers if workers is not None else (os.cpu_count() or 1) if len(jobs) > 2 else 0
     summary, begun = Summary(), time.perf_counter()
     with tqdm(total=len(jobs), desc="prepare", unit="shape", disable=not progress) as bar:
-        for job, (state, why) in _run(jobs, recipe, store, workers):
+        for job, (state, why) in _run(jobs, recipe, store, processes(workers, len(jobs))):
             if state == "failed":
                 summary.failures.append((job.label, why))
             elif state == "made":

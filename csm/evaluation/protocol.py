@@ -13,6 +13,7 @@ from functools import partial
 from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from csm._types import IntArray
@@ -145,8 +146,9 @@ def evaluate_matches(
     progress
         Show a bar with the names of the shapes.
     workers
-        Processes that measure distances while this one goes on matching; 1 measures in this process.  More than one
-        needs the caller's script to be importable (``if __name__ == "__main__"``), as with any process pool.
+        Processes of one thread each that measure distances while this one goes on matching; up to 1 measures in this
+        process.  More need the caller's script to be importable (``if __name__ == "__main__"``), as with any process
+        pool.
 
     Raises
     ------
@@ -220,7 +222,12 @@ def _pool(workers: int) -> Iterator[Callable[..., Future[Any]]]:
         yield _at_once
         return
     with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        yield pool.submit
+        yield lambda *task: pool.submit(_on_one_thread, *task)
+
+
+def _on_one_thread(function: Callable[..., Any], *args: Any) -> Any:
+    with threadpool_limits(1):
+        return function(*args)
 
 
 def _at_once(function: Callable[..., Any], *args: Any) -> Future[Any]:

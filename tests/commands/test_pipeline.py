@@ -6,6 +6,7 @@ import csv
 import importlib
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -93,6 +94,18 @@ def test_a_checkpoint_evaluates_to_the_same_numbers_without_its_config(bench, tr
     options = ["data=folder", "data.root=toys", "data.n_test=2", "hydra.run.dir=eval", POINTS]
     bench.run("evaluate", f"checkpoint={checkpoint}", *options)
     assert bench.json("eval/result.json")["age/toys"] == pytest.approx(bench.json("run/result.json")["age/toys"])
+
+
+@pytest.mark.slow
+def test_the_number_of_workers_changes_nothing(bench, trained):
+    rows = []
+    for workers in (1, 2):
+        options = ["data=folder", "data.root=toys", "data.n_test=3", POINTS, f"hydra.run.dir=eval{workers}"]
+        bench.run("evaluate", f"checkpoint={trained}", *options, f"workers={workers}")
+        (row,) = read_rows(bench.folder / f"eval{workers}/rows.json")
+        rows.append(replace(row, seconds=0.0, command="csm evaluate", commit="any"))
+    assert rows[0] == rows[1]
+    assert rows[0].pairs == 6
 
 
 def test_a_sweep_goes_on_after_a_failing_job_and_ends_in_one_table(bench, capsys):

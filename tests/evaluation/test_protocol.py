@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info
 
 from csm.data.shapeset import Shape
 from csm.errors import ConfigError, DataError
-from csm.evaluation import metrics
+from csm.evaluation import metrics, protocol
 from csm.evaluation.protocol import Protocol, evaluate_matches
 from csm.evaluation.results import Evaluation
 from csm.mesh.correspondence import Direction, PointMap
@@ -117,6 +121,39 @@ def test_scale_plays_no_part_and_the_truth_has_no_error() -> None:
 def test_workers_change_nothing() -> None:
     one, two = (evaluate_matches(shapes(), noisy, Protocol(), progress=False, workers=w) for w in (1, 2))
     np.testing.assert_array_equal(one.errors, two.errors)
+
+
+@pytest.mark.slow
+def test_a_worker_has_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        monkeypatch.delenv(variable, raising=False)
+    with protocol._pool(2) as submit:
+        libraries = submit(threadpool_info).result()
+    assert libraries
+    assert {library["num_threads"] for library in libraries} == {1}
+
+
+def test_matching_goes_on_while_distances_are_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The workers wait here until the last pair is matched; an evaluation that waited for them would not end well."""
+    asked, all_matched, pairs = [], threading.Event(), 6
+
+    @contextmanager
+    def patient(workers: int) -> Iterator[Callable[..., Future[object]]]:
+        def wait_and_run(function: Callable[..., object], *args: object) -> object:
+            assert all_matched.wait(timeout=20)
+            return function(*args)
+
+        with ThreadPoolExecutor(workers) as pool:
+            yield lambda *job: pool.submit(wait_and_run, *job)
+
+    def match(source: Shape, target: Shape) -> np.ndarray:
+        asked.append((source.name, target.name))
+        if len(asked) == pairs:
+            all_matched.set()
+        return noisy(source, target)
+
+    monkeypatch.setattr(protocol, "_pool", patient)
+    assert len(evaluate_matches(shapes(), match, Protocol(), progress=False, workers=2).rows) == pairs
 
 
 def test_a_match_on_another_component_counts_as_a_diameter() -> None:
