@@ -6,10 +6,37 @@ Examples
 ('theta=0.000 T0', 'theta=0.000 T1')
 """
 
+from csm.descriptors.amks import AMKS
+from csm.descriptors.asmwd import ASMWD
+from csm.descriptors.awft import AWFT
 from csm.descriptors.base import Descriptor, Features
 from csm.descriptors.chebyshev import ACD
+from csm.descriptors.dep import DEP
+from csm.descriptors.gps import GPS
 from csm.descriptors.heat import HKS
 from csm.descriptors.presets import PRESETS, from_parameters, preset
+from csm.descriptors.shot import SHOT
+from csm.descriptors.smwd import SMWD
 from csm.descriptors.wave import WKS
+from csm.descriptors.weds import WEDS
+from csm.descriptors.wft import WFT
 
-__all__ = ["ACD", "HKS", "PRESETS", "WKS", "Descriptor", "Features", "from_parameters", "preset"]
+__all__ = [
+    "ACD",
+    "AMKS",
+    "ASMWD",
+    "AWFT",
+    "DEP",
+    "GPS",
+    "HKS",
+    "PRESETS",
+    "SHOT",
+    "SMWD",
+    "WEDS",
+    "WFT",
+    "WKS",
+    "Descriptor",
+    "Features",
+    "from_parameters",
+    "preset",
+]

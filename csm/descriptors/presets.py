@@ -5,10 +5,19 @@ from __future__ import annotations
 from dataclasses import fields, replace
 from typing import Any
 
+from csm.descriptors.amks import AMKS
+from csm.descriptors.asmwd import ASMWD
+from csm.descriptors.awft import AWFT
 from csm.descriptors.base import Descriptor
 from csm.descriptors.chebyshev import ACD
+from csm.descriptors.dep import DEP
+from csm.descriptors.gps import GPS
 from csm.descriptors.heat import HKS
+from csm.descriptors.shot import SHOT
+from csm.descriptors.smwd import SMWD
 from csm.descriptors.wave import WKS
+from csm.descriptors.weds import WEDS
+from csm.descriptors.wft import WFT
 from csm.errors import ConfigError
 
 PRESETS: dict[str, Descriptor] = {
@@ -19,8 +28,20 @@ PRESETS: dict[str, Descriptor] = {
     "hks": HKS(),
     "wks": WKS(),
     "wks_functional_map": WKS(variant="functional_map"),
+    "shot": SHOT(),
+    "dep": DEP(),
+    "amks": AMKS(),
+    "smwd": SMWD(),
+    "smwd_mexican": SMWD(variant="mexican"),
+    "weds": WEDS(),
+    "wft": WFT(),
+    "awft": AWFT(),
+    "asmwd": ASMWD(),
+    "gps": GPS(),
 }
 """Named settings; "acd_release_frame" reproduces the authors' output with their frame, world axes and all."""
+
+_FAMILIES: dict[str, Any] = {descriptor.name: type(descriptor) for descriptor in PRESETS.values()}
 
 
 def preset(name: str, **overrides: Any) -> Descriptor:
@@ -60,11 +81,10 @@ def from_parameters(name: str, **parameters: Any) -> Descriptor:
     >>> from_parameters("hks", **HKS(n_times=16).parameters()) == HKS(n_times=16)
     True
     """
-    families: dict[str, Any] = {family.name: family for family in (ACD, HKS, WKS)}
-    if name not in families:
-        raise ConfigError(f"there is no descriptor family {name!r}; there are {', '.join(families)}")
+    if name not in _FAMILIES:
+        raise ConfigError(f"there is no descriptor family {name!r}; there are {', '.join(_FAMILIES)}")
     try:
-        descriptor: Descriptor = families[name](**parameters)
+        descriptor: Descriptor = _FAMILIES[name](**parameters)
     except TypeError as error:
         raise ConfigError(f"descriptor {name}: {error}") from error
     return descriptor

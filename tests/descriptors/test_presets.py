@@ -1,8 +1,10 @@
 from __future__ import annotations
 
+import json
+
 import pytest
 
-from csm.descriptors import ACD, PRESETS, preset
+from csm.descriptors import ACD, PRESETS, from_parameters, preset
 from csm.errors import ConfigError
 
 
@@ -14,8 +16,16 @@ def test_paper_and_release_are_the_settings_of_the_table():
 
 @pytest.mark.parametrize("name", list(PRESETS))
 def test_every_preset_lets_every_parameter_be_replaced(name):
-    changed = preset(name, k=33)
-    assert changed.parameters() == preset(name).parameters() | {"k": 33}
+    before = preset(name).parameters()
+    key = "k" if "k" in before else "bins"
+    assert preset(name, **{key: 33}).parameters() == before | {key: 33}
+
+
+@pytest.mark.parametrize("name", list(PRESETS))
+def test_every_preset_comes_back_from_its_record(name):
+    descriptor = PRESETS[name]
+    record = json.loads(json.dumps({"name": descriptor.name, **descriptor.parameters()}))
+    assert from_parameters(**record) == descriptor
 
 
 def test_unknown_names_parameters_and_values_are_refused():
