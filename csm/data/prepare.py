@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -82,14 +83,17 @@ class Summary:
 
 def compute_features(mesh: Mesh, descriptor: Descriptor, store: Store) -> Float32Array:
     """Return the descriptor of a mesh, shape (N, Q), from the store or computed and kept."""
-    params = {"name": descriptor.name, **descriptor.parameters()}
 
     def make() -> dict[str, Float32Array]:
         require_usable(mesh)
         return {"values": descriptor(mesh).values.astype(np.float32)}
 
-    values: Float32Array = store.fetch("descriptor", mesh, params, make)["values"]
+    values: Float32Array = store.fetch("descriptor", mesh, _parameters(descriptor), make)["values"]
     return values
+
+
+def _parameters(descriptor: Descriptor) -> dict[str, Any]:
+    return {"name": descriptor.name, **descriptor.parameters()}
 
 
 def prepare_shape(shape: Shape, recipe: Recipe, store: Store) -> Prepared:
@@ -98,12 +102,21 @@ def prepare_shape(shape: Shape, recipe: Recipe, store: Store) -> Prepared:
     return Prepared(shape, features, Operators(shape.mesh, memo=store).lbo(recipe.basis_k))
 
 
+def is_prepared(mesh: Mesh, recipe: Recipe, store: Store) -> bool:
+    """Tell whether `prepare_shape` would find everything in the store; nothing is read."""
+    return store.has("descriptor", mesh, _parameters(recipe.descriptor)) and store.has(
+        "lbo", mesh.unit_area(), {"k": recipe.basis_k}
+    )
+
+
 def _prepare_one(job: Job, recipe: Recipe, root: str) -> tuple[str, str]:
     """Prepare one shape in a worker; return what happened ("present", "made" or "failed") and why."""
     store = Store(root)
     try:
         with threadpool_limits(1):
-            prepare_shape(job.shapes.load(job.name), recipe, store)
+            shape = job.shapes.load(job.name)
+            if not is_prepared(shape.mesh, recipe, store):
+                prepare_shape(shape, recipe, store)
     except CsmError as error:
         return "failed", str(error)
     except Exception as error:  # one bad shape must not end the run; the table at the end names it
@@ -127,6 +140,8 @@ def prepare(
     jobs: Sequence[Job], recipe: Recipe, store: Store, *, workers: int | None = None, progress: bool = True
 ) -> Summary:
     """Fill the store for many shapes; what is there already is skipped, so a killed run is simply started again.
+
+    Entries that are there are not read, as whoever loads them will; one with a fault inside is computed again then.
 
     Parameters
     ----------

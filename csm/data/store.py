@@ -77,8 +77,9 @@ class Store:
         return self.root / kind / f"{hashlib.sha256(request.encode()).hexdigest()[:40]}.npz"
 
     def has(self, kind: str, mesh: Mesh, params: Mapping[str, Any]) -> bool:
-        """Tell whether the entry's file exists (it is not read)."""
-        return self.path(kind, mesh, params).is_file()
+        """Tell whether the entry is there, with the end of its file; faults inside show when it is read."""
+        path = self.path(kind, mesh, params)
+        return path.is_file() and zipfile.is_zipfile(path)
 
     def fetch(self, kind: str, mesh: Mesh, params: Mapping[str, Any], make: Callable[[], Arrays]) -> Arrays:
         """Return the entry's arrays; compute them with `make` and keep them if they are not there yet.

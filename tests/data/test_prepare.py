@@ -5,7 +5,7 @@ import pytest
 
 from csm.data.folder import recognise
 from csm.data.prepare import Job, Recipe, compute_features, prepare, prepare_shape
-from csm.data.store import Store
+from csm.data.store import Store, read_entry
 from csm.descriptors import ACD
 from csm.mesh.io import write_mesh
 from csm.mesh.shape import Mesh
@@ -30,6 +30,41 @@ def test_a_second_run_finds_everything(toys, tmp_path, workers):
     second = prepare(jobs(toys), RECIPE, store, workers=workers, progress=False)
     assert (first.made, first.present, first.failures) == (4, 0, [])
     assert (second.made, second.present) == (0, 4)
+
+
+def test_entries_that_are_there_are_not_read(toys, tmp_path, monkeypatch):
+    store, read = Store(tmp_path / "store"), []
+    prepare(jobs(toys), RECIPE, store, workers=0, progress=False)
+
+    def watched(path):
+        read.append(path)
+        return read_entry(path)
+
+    monkeypatch.setattr("csm.data.store.read_entry", watched)
+    assert prepare(jobs(toys), RECIPE, store, workers=0, progress=False).present == 4
+    assert read == []
+    for name in toys.names:
+        prepare_shape(toys.load(name), RECIPE, store)
+    assert sorted(read) == store.files()
+    assert store.computed == 0
+
+
+@pytest.mark.parametrize("kind", ["descriptor", "lbo"])
+def test_a_cut_entry_is_made_again_at_once_and_a_faulty_one_when_it_is_loaded(toys, tmp_path, caplog, kind):
+    store, shape = Store(tmp_path / "store"), toys.load("toy0")
+    sound = prepare_shape(shape, RECIPE, store)
+    (path,) = [file for file in store.files() if file.parent.name == kind]
+    content = bytearray(path.read_bytes())
+    path.write_bytes(content[: len(content) // 2])
+    assert prepare(jobs(toys)[:1], RECIPE, store, workers=0, progress=False).made == 1
+    content[len(content) // 2] ^= 0xFF
+    path.write_bytes(content)
+    assert prepare(jobs(toys)[:1], RECIPE, store, workers=0, progress=False).present == 1
+    caplog.clear()
+    again = prepare_shape(shape, RECIPE, store)
+    assert "computing it again" in caplog.text
+    np.testing.assert_array_equal(again.features, sound.features)
+    np.testing.assert_array_equal(again.basis.evals, sound.basis.evals)
 
 
 def test_an_interrupted_run_goes_on_where_it_was(toys, tmp_path):
