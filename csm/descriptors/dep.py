@@ -62,6 +62,10 @@ class DEP:
     kept to seven digits, so a pair that is delta apart to that precision may fall on either side.  Parts that no path
     joins are infinitely far apart, except for the biharmonic distance.
 
+    Paths through the midpoints of edges as well are four times as even (over exact distances, a spread of 0.3 % against
+    1.3 %) at twice the time, and match no better: errors of 163 and 164 thousandths of the diameter on four pairs of
+    remeshed FAUST, and 162 by heat.  So they are left out.
+
     References
     ----------
     Melzi, Ovsjanikov, Roffo, Cristani, Castellani, "Discrete time evolution process descriptor for shape analysis and
