@@ -8,8 +8,8 @@ from typing import Any
 
 from omegaconf import DictConfig, OmegaConf
 from torch import Tensor
-from tqdm import tqdm
 
+from csm._progress import progress_bar
 from csm._types import IntArray
 from csm.data.datamodule import CorrespondenceDataModule
 from csm.data.prepare import Job, processes
@@ -51,7 +51,7 @@ def test_on(
     loaded = [datamodule.load(shapes, name) for name in names]
     descriptors = {
         item.sample.name: module.describe(item.sample)
-        for item in tqdm(loaded, desc=f"describe {shapes.name}", unit="shape", leave=False)
+        for item in progress_bar(loaded, desc=f"describe {shapes.name}", unit="shape", leave=False)
     }
 
     def match(source: Shape, target: Shape) -> IntArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import sys
 import time
 import warnings
 from pathlib import Path
@@ -19,7 +20,7 @@ from csm.commands.testing import numbers, test_all
 from csm.data.datamodule import CorrespondenceDataModule
 from csm.errors import ConfigError
 from csm.evaluation.provenance import provenance
-from csm.learning.callbacks import ValidationErrors
+from csm.learning.callbacks import EpochLines, ValidationErrors
 from csm.learning.export import export_module
 from csm.learning.module import CSMModule
 from csm.learning.panels import TensorBoardPanels
@@ -91,20 +92,26 @@ def make_module(cfg: DictConfig, datamodule: CorrespondenceDataModule) -> CSMMod
 
 
 def make_trainer(cfg: DictConfig, folder: Path) -> L.Trainer:
-    """Make the trainer with its callbacks; the last checkpoint is kept so that a killed run can go on."""
+    """Make the trainer with its callbacks; the last checkpoint is kept so that a killed run can go on.
+
+    Lightning's bar redraws itself on stdout at every step; where that is no terminal, lines take its place.
+    """
     errors = ValidationErrors(seed=cfg.seed)
     groups = ("seed", "data", "descriptor", "model", "optimizer", "trainer")
     hparams = {name: OmegaConf.to_container(cfg, resolve=True)[name] for name in groups}  # type: ignore[index, call-overload]
+    progress = cfg.trainer.get("enable_progress_bar", True)
+    terminal = sys.stdout.isatty()
     callbacks = [
         errors,
         TensorBoardPanels(errors, hparams),
         ModelCheckpoint(
             folder / "checkpoints", filename="last", enable_version_counter=False, save_on_train_epoch_end=True
         ),
+        *([EpochLines()] if progress and not terminal else []),
     ]
     logger = instantiate(cfg.logger, _partial_=True)(save_dir=folder) if cfg.logger else False
     trainer: L.Trainer = instantiate(cfg.trainer, _partial_=True)(
-        callbacks=callbacks, logger=logger, default_root_dir=folder
+        callbacks=callbacks, logger=logger, default_root_dir=folder, enable_progress_bar=progress and terminal
     )
     return trainer
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tqdm import tqdm
-
+from csm._progress import progress_bar
 from csm.data.folderset import FolderSet
 from csm.errors import CsmError
 from csm.mesh.check import Finding, check
@@ -43,7 +42,7 @@ class Inspected:
 
 def inspect(shapes: FolderSet, progress: bool = True) -> tuple[Inspected, ...]:
     """Read and check every shape of a set, one after the other; nothing is raised for a bad one."""
-    with tqdm(shapes.names, desc=f"check {shapes.name}", unit="shape", disable=not progress) as bar:
+    with progress_bar(shapes.names, desc=f"check {shapes.name}", unit="shape", disable=not progress) as bar:
         rows = []
         for name in bar:
             bar.set_postfix_str(name, refresh=False)

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
-from tqdm import tqdm
 
+from csm._progress import progress_bar
 from csm._types import Float32Array
 from csm.data.shapeset import Shape, ShapeSet
 from csm.data.store import Store
@@ -162,7 +162,7 @@ def prepare(
         Failures are listed there, not raised.
     """
     summary, begun = Summary(), time.perf_counter()
-    with tqdm(total=len(jobs), desc="prepare", unit="shape", disable=not progress) as bar:
+    with progress_bar(total=len(jobs), desc="prepare", unit="shape", disable=not progress) as bar:
         for job, (state, why) in _run(jobs, recipe, store, processes(workers, len(jobs))):
             if state == "failed":
                 summary.failures.append((job.label, why))

@@ -16,6 +16,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
+from csm._progress import progress_bar
 from csm._types import IntArray
 from csm.data.shapeset import Shape
 from csm.errors import ConfigError, DataError
@@ -162,7 +163,7 @@ def evaluate_matches(
     started = time.perf_counter()
     jobs: dict[str, Future[TargetErrors]] = {}
     asked: dict[str, list[MatchedPoints]] = {}
-    with tqdm(total=len(pairs), unit="pair", disable=not progress) as bar, _pool(workers) as submit:
+    with progress_bar(total=len(pairs), unit="pair", disable=not progress) as bar, _pool(workers) as submit:
         for target, sources in _by_target(pairs).items():
             asked[target] = []
             for source in sources:

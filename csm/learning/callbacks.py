@@ -1,7 +1,8 @@
-"""Callbacks: validation errors while a network learns."""
+"""Callbacks: validation errors while a network learns, and lines instead of a progress bar."""
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import lightning as L
@@ -58,3 +59,32 @@ class ValidationErrors(L.Callback):
         self.latest = evaluate_matches(shapes, match, self.protocol, progress=False)
         pl_module.log("val/age", self.latest.summary["age"], prog_bar=True)
         pl_module.log("val/exact", self.latest.summary["exact"], prog_bar=True)
+
+
+class EpochLines(L.Callback):
+    """Print one line per epoch, for logs: what a progress bar would show, and the time the epoch took.
+
+    A validation's numbers are in the line of its epoch only.
+    """
+
+    def __init__(self) -> None:
+        self._begun, self._validated = time.perf_counter(), False
+
+    def on_train_epoch_start(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
+        """Start the clock."""
+        self._begun, self._validated = time.perf_counter(), False
+
+    def on_validation_epoch_end(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
+        """Note that this epoch has numbers of a validation."""
+        self._validated = True
+
+    def on_train_epoch_end(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
+        """Print the line."""
+        shown = {
+            name: float(value)
+            for name, value in trainer.progress_bar_metrics.items()
+            if self._validated or not name.startswith("val/")
+        }
+        numbers = "".join(f", {name} {value:.4g}" for name, value in shown.items())
+        seconds = time.perf_counter() - self._begun
+        print(f"epoch {trainer.current_epoch + 1} of {trainer.max_epochs}: {seconds:.1f} s{numbers}", flush=True)

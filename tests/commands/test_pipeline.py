@@ -11,8 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from omegaconf import OmegaConf
 
+from csm.commands.train import make_trainer
 from csm.evaluation.report import read_rows
+from csm.learning.callbacks import EpochLines
 from csm.mesh.io import read_mesh
 from tests.toyset import write_toys
 
@@ -94,6 +97,18 @@ def test_a_checkpoint_evaluates_to_the_same_numbers_without_its_config(bench, tr
     options = ["data=folder", "data.root=toys", "data.n_test=2", "hydra.run.dir=eval", POINTS]
     bench.run("evaluate", f"checkpoint={checkpoint}", *options)
     assert bench.json("eval/result.json")["age/toys"] == pytest.approx(bench.json("run/result.json")["age/toys"])
+
+
+@pytest.mark.parametrize(
+    ("terminal", "wanted", "bar", "lines"), [(1, 1, 1, 0), (0, 1, 0, 1), (1, 0, 0, 0), (0, 0, 0, 0)]
+)
+def test_a_bar_is_for_terminals_and_lines_are_for_logs(tmp_path, monkeypatch, terminal, wanted, bar, lines):
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: bool(terminal))
+    options = {"_target_": "lightning.Trainer", "accelerator": "cpu", "enable_progress_bar": bool(wanted)}
+    groups = {name: {} for name in ("data", "descriptor", "model", "optimizer")}
+    trainer = make_trainer(OmegaConf.create({"seed": 0, "logger": None, "trainer": options, **groups}), tmp_path)
+    assert (trainer.progress_bar_callback is not None) == bool(bar)
+    assert any(isinstance(callback, EpochLines) for callback in trainer.callbacks) == bool(lines)
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ from lightning import Trainer
 
 from csm.errors import ConfigError, DataError
 from csm.evaluation.matching import nearest
-from csm.learning.callbacks import ValidationErrors
+from csm.learning.callbacks import EpochLines, ValidationErrors
 from csm.learning.export import load_module
 from csm.learning.module import CSMModule
 from tests.toyset import toy_datamodule
@@ -67,6 +67,17 @@ def test_training_learns_to_match_and_logs_the_validation_error(trained, datamod
     assert trainer.callback_metrics["val/age"] < 0.05
     assert trainer.callback_metrics["val/exact"] > 0.7
     assert trainer.callback_metrics["train/loss"] < 1.0
+
+
+def test_a_line_per_epoch_shows_the_numbers_of_the_bar(datamodule, tmp_path, capsys):
+    callbacks = [ValidationErrors(pairs=2, points=20), EpochLines()]
+    trainer = train(make(datamodule), datamodule, tmp_path, 3, callbacks=callbacks, check_val_every_n_epoch=2)
+    said = capsys.readouterr()
+    lines = [line for line in said.out.splitlines() if line.startswith("epoch")]
+    assert [line.partition(":")[0] for line in lines] == ["epoch 1 of 3", "epoch 2 of 3", "epoch 3 of 3"]
+    assert ["val/age" in line for line in lines] == [False, True, False]
+    assert lines[2].endswith(f"train/loss {trainer.callback_metrics['train/loss']:.4g}")
+    assert "\r" not in said.out + said.err
 
 
 def test_the_loss_is_the_cross_entropy_of_the_labelled_rows(datamodule):
