@@ -37,6 +37,8 @@ class Memo(Protocol):
 class Operators:
     """Laplacians and spectra of one mesh, lazy and memoised.
 
+    The pairs of a Laplacian that were computed before, if they are enough, serve a later wish for fewer of them.
+
     Parameters
     ----------
     mesh
@@ -127,13 +129,23 @@ class Operators:
     def _spectrum(self, kind: str, params: dict[str, Any], solve: Callable[[], Spectrum]) -> Spectrum:
         key = (kind, tuple(params.items()))
         if key not in self._spectra:
-            if self._memo is None:
+            larger = self._larger(kind, params)
+            if larger is not None:
+                self._spectra[key] = larger.first(params["k"])
+            elif self._memo is None:
                 self._spectra[key] = solve()
             else:
                 self._spectra[key] = _from_arrays(
                     self._memo.fetch(kind, self.mesh, params, lambda: _to_arrays(solve()))
                 )
         return self._spectra[key]
+
+    def _larger(self, kind: str, params: dict[str, Any]) -> Spectrum | None:
+        """Return a spectrum of the same Laplacian with more pairs that is already here, if there is one."""
+        for (other, items), spectrum in self._spectra.items():
+            if other == kind and len(spectrum.evals) > params["k"] and {**dict(items), "k": params["k"]} == params:
+                return spectrum
+        return None
 
 
 def _to_arrays(spectrum: Spectrum) -> Arrays:

@@ -56,6 +56,21 @@ def test_nothing_is_computed_before_or_twice(monkeypatch):
     assert calls == ["eigenpairs", "face_frames", "eigenpairs", "eigenpairs"]
 
 
+def test_fewer_pairs_are_taken_from_more_and_are_those_of_an_own_solution(monkeypatch):
+    solved = []
+    honest = module.eigenpairs
+    monkeypatch.setattr(module, "eigenpairs", lambda *a, **k: solved.append(a[2]) or honest(*a, **k))
+    both = Operators(blob(3))
+    for ask in (lambda o, k: o.lbo(k), lambda o, k: o.albo(10, 0.5, k)):
+        more, fewer, own = ask(both, 60), ask(both, 25), ask(Operators(blob(3)), 25)
+        np.testing.assert_array_equal(fewer.evals, more.evals[:25])
+        np.testing.assert_allclose(fewer.evals, own.evals, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(fewer.evecs, own.evecs, atol=1e-7)
+    assert solved == [60, 25, 60, 25]
+    both.albo(10, 0.6, 25), both.albo(4, 0.5, 25), both.albo(10, 0.5, 25, sweeps=2), both.lbo(61)
+    assert solved[4:] == [25, 25, 25, 61]
+
+
 def test_a_memo_is_asked_with_plain_data_and_its_answer_is_the_same():
     mesh, shelf = blob(2), Shelf()
     first, second = Operators(mesh, memo=shelf), Operators(mesh, memo=shelf)
@@ -70,7 +85,7 @@ def test_a_memo_is_asked_with_plain_data_and_its_answer_is_the_same():
 def test_every_parameter_is_part_of_the_memo_key():
     shelf = Shelf()
     operators = Operators(blob(2), memo=shelf)
-    asked = [{}, {"alpha": 4.0}, {"theta": 0.2}, {"k": 5}, {"frame": "released"}, {"sweeps": 1}]
+    asked = [{}, {"alpha": 4.0}, {"theta": 0.2}, {"k": 7}, {"frame": "released"}, {"sweeps": 1}]
     for change in asked:
         operators.albo(**({"alpha": 10.0, "theta": 0.1, "k": 6} | change))
     assert shelf.made == ["albo"] * len(asked)
