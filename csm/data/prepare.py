@@ -81,12 +81,17 @@ class Summary:
         return "\n".join(f"{label:<{width}}  {why}" for label, why in self.failures)
 
 
-def compute_features(mesh: Mesh, descriptor: Descriptor, store: Store) -> Float32Array:
-    """Return the descriptor of a mesh, shape (N, Q), from the store or computed and kept."""
+def compute_features(
+    mesh: Mesh, descriptor: Descriptor, store: Store, operators: Operators | None = None
+) -> Float32Array:
+    """Return the descriptor of a mesh, shape (N, Q), from the store or computed and kept.
+
+    `operators` of the mesh at unit area may be given, so that several descriptors share their eigenpairs.
+    """
 
     def make() -> dict[str, Float32Array]:
         require_usable(mesh)
-        return {"values": descriptor(mesh).values.astype(np.float32)}
+        return {"values": descriptor(operators or mesh).values.astype(np.float32)}
 
     values: Float32Array = store.fetch("descriptor", mesh, _parameters(descriptor), make)["values"]
     return values

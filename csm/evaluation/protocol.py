@@ -156,7 +156,7 @@ def evaluate_matches(
     DataError
         If names repeat or are unknown, shapes have no template point in common, or a match has the wrong shape.
     """
-    by_name = {shape.name: _thinned(shape, protocol) for shape in shapes}
+    by_name = {shape.name: thinned(shape, protocol) for shape in shapes}
     if len(by_name) != len(shapes):
         raise DataError(f"{len(shapes)} shapes have only {len(by_name)} different names; each needs its own")
     pairs = protocol.choose(list(by_name))
@@ -168,7 +168,7 @@ def evaluate_matches(
             asked[target] = []
             for source in sources:
                 bar.set_postfix_str(f"{source} -> {target}")
-                asked[target].append(_matched_points(by_name[source], by_name[target], match))
+                asked[target].append(matched_points(by_name[source], by_name[target], match))
             args = by_name[target].mesh, protocol.distance, protocol.normaliser, asked[target]
             jobs[target] = submit(target_errors, *args)
             jobs[target].add_done_callback(partial(_advance, bar, len(sources)))
@@ -178,7 +178,7 @@ def evaluate_matches(
     return summarise(measured, protocol, time.perf_counter() - started)
 
 
-def _thinned(shape: Shape, protocol: Protocol) -> Shape:
+def thinned(shape: Shape, protocol: Protocol) -> Shape:
     """Return the shape with only the points of the protocol known."""
     truth = shape.truth.as_template_to_shape()
     if protocol.points is None or protocol.points >= truth.n_from:
@@ -195,7 +195,14 @@ def _by_target(pairs: Sequence[Pair]) -> dict[str, list[str]]:
     return sources
 
 
-def _matched_points(source: Shape, target: Shape, match: Matcher) -> MatchedPoints:
+def matched_points(source: Shape, target: Shape, match: Matcher) -> MatchedPoints:
+    """Return where the template points known on both shapes belong on the target, and where `match` takes them.
+
+    Raises
+    ------
+    DataError
+        If the shapes have no template point in common, or the match has the wrong shape.
+    """
     points = ground_truth(source.truth, target.truth)
     matched = np.asarray(match(source, target))
     n, m = source.mesh.n_vertices, target.mesh.n_vertices
