@@ -10,11 +10,10 @@ from __future__ import annotations
 import argparse
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import anny
 import numpy as np
 import torch
-from anny.face_segmentation import get_face_segmentation_mask
 from humans.bodies import LOCAL_SHAPES, PHENOTYPES, POSES, SUBJECTS, Rig, pose_matrices
 from humans.caps import cap
 from humans.decimate import Decimation
@@ -25,6 +24,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 from tqdm import tqdm
+
+if TYPE_CHECKING:
+    import anny
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -42,6 +44,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=2024, help="seed of the shape details and pose differences")
     parser.add_argument("--vertices", type=int, default=6900, help="at most this many vertices")
     args = parser.parse_args()
+    import anny
+
     model = anny.Anny(local_changes="default")
     template, faces, part, mirror = body_surface(model)
     shapes = people(model, args.seed)[:, part]
@@ -69,6 +73,8 @@ def body_surface(model: anny.Anny) -> tuple[Floats, Ints, Ints, Ints]:
 
 def cavity_faces(model: anny.Anny, part: Ints) -> NDArray[np.bool_]:
     """Mark the faces of the body surface that line the mouth and the eye sockets."""
+    from anny.face_segmentation import get_face_segmentation_mask
+
     inside = np.isin(model.faces.numpy(), part).all(axis=1)
     mask: NDArray[np.bool_] = get_face_segmentation_mask(model, CAVITIES).numpy()
     return mask[inside]

@@ -85,4 +85,4 @@ def segment_meets(p: Floats, q: Floats, triangles: Floats) -> NDArray[np.bool_]:
         r = np.cross(s, e1)
         v = (direction * r).sum(1) / det
         t = (e2 * r).sum(1) / det
-    return (np.abs(det) > 1e-18) & (u > 0) & (v > 0) & (u + v < 1) & (t > 0) & (t < 1)
+        return (np.abs(det) > 1e-18) & (u > 0) & (v > 0) & (u + v < 1) & (t > 0) & (t < 1)
