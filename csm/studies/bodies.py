@@ -1,0 +1,170 @@
+"""The bodies that the figures show: FAUST where it is there, else the built-in humans, each at several resolutions."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+from csm._types import Float32Array
+from csm.data.datasets import find_set
+from csm.data.humansset import HumansSet
+from csm.data.prepare import compute_features
+from csm.data.shapeset import Shape, ShapeSet
+from csm.data.store import Store
+from csm.descriptors.presets import preset
+from csm.errors import ConfigError, DataError
+from csm.mesh.shape import Mesh
+from csm.studies.study import Context
+from csm.viewer.camera import Axis
+
+Source: TypeAlias = Literal["auto", "faust", "humans"]
+
+RIVALS = (
+    "acd_paper",
+    "acd_release",
+    "asmwd",
+    "wft",
+    "weds",
+    "awft",
+    "wks",
+    "amks",
+    "hks",
+    "dep",
+    "smwd",
+    "shot",
+)
+"""Presets of the descriptors that the paper compares, in the order of its Table 1; of ACD both settings."""
+
+_FAUST_SETS = ("FAUST_10000", "FAUST_15000", "FAUST_5k_remeshed")
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """One set of bodies over one template, in its own and in other triangulations.
+
+    Parameters
+    ----------
+    title
+        What captions call the set.
+    original
+        The bodies as they are.
+    others
+        The same bodies in other triangulations, by short titles such as "10,000 vertices".
+    body, other_pose, other_person
+        Names: the one that is looked at, the same person otherwise, and somebody else.
+    landmarks
+        Name -> template point.
+    up
+        Axis of the data that points up.
+    """
+
+    title: str
+    original: ShapeSet
+    others: Mapping[str, ShapeSet]
+    body: str
+    other_pose: str
+    other_person: str
+    landmarks: Mapping[str, int] = field(default_factory=dict)
+    up: Axis | Literal["auto"] = "auto"
+
+    @property
+    def resolutions(self) -> dict[str, ShapeSet]:
+        """All triangulations, the original one first."""
+        shape = self.original.load(self.body)
+        return {f"{shape.mesh.n_vertices:,} vertices": self.original, **self.others}
+
+
+def built_in_bodies(store: Store) -> Bodies:
+    """Return the built-in humans, refined to 10,000 and 15,000 vertices and remeshed to 5,000."""
+    root = str(store.root)
+    others = {
+        "10,000 vertices": HumansSet("refined", 10000, root),
+        "15,000 vertices": HumansSet("refined", 15000, root),
+        "5,000 vertices, remeshed": HumansSet("remeshed", 5000, root),
+    }
+    landmarks = {"left hand": 4395, "left knee": 5874, "head": 242}
+    return Bodies("built-in humans", HumansSet(), others, "s08_p02", "s08_p05", "s07_p00", landmarks, "z")
+
+
+def faust_bodies(root: Path) -> Bodies:
+    """Return FAUST, test person 8, with those of its other triangulations that are there.
+
+    Raises
+    ------
+    DataError
+        If FAUST itself is not below `root`.
+    """
+    titles = ("10,000 vertices", "15,000 vertices", "5,000 vertices, remeshed")
+    original = find_set(root, "FAUST_6890", "FAUST_MPI")
+    others: dict[str, ShapeSet] = {}
+    for title, name in zip(titles, _FAUST_SETS, strict=True):
+        try:
+            others[title] = find_set(root, name)
+        except DataError as error:
+            _log.warning("%s is left out: %s", name, error)
+    # Points of the SMPL template: tip of the left middle finger, front of the left knee, top of the head.
+    landmarks = {"left hand": 2445, "left knee": 1043, "head": 411}
+    return Bodies("FAUST", original, others, "tr_reg_080", "tr_reg_082", "tr_reg_090", landmarks, "y")
+
+
+def find_bodies(source: Source | Bodies, context: Context) -> Bodies:
+    """Return the bodies of a source; "auto" takes FAUST if it is below the root of the data, else the built-in humans.
+
+    Raises
+    ------
+    DataError
+        If FAUST is asked for and not there.
+    ConfigError
+        If there is no such source.
+    """
+    if isinstance(source, Bodies):
+        return source
+    if source == "humans":
+        return built_in_bodies(context.store)
+    if source == "faust":
+        return faust_bodies(context.root)
+    if source != "auto":
+        raise ConfigError(f"source={source!r} is unknown; choose auto, faust or humans")
+    try:
+        return faust_bodies(context.root)
+    except DataError as error:
+        _log.info("the built-in humans are taken: %s", error)
+        return built_in_bodies(context.store)
+
+
+def landmark_vertices(bodies: Bodies, shape: Shape) -> dict[str, int]:
+    """Return the vertex of each landmark on a shape.
+
+    Raises
+    ------
+    ConfigError
+        If a landmark is no template point with a counterpart on the shape.
+    """
+    truth = shape.truth.as_template_to_shape()
+    found = {}
+    for name, point in bodies.landmarks.items():
+        if not 0 <= point < truth.n_from or truth.indices[point] < 0:
+            raise ConfigError(f"landmark {name}: template point {point} has no vertex on {shape.name}")
+        found[name] = int(truth.indices[point])
+    return found
+
+
+def describe(mesh: Mesh, name: str, store: Store) -> Float32Array:
+    """Return the descriptor called `name` in the presets for each vertex, (N, Q), from the store or computed."""
+    return compute_features(mesh, preset(name), store)
+
+
+def label(name: str) -> str:
+    """Return what a figure calls a preset.
+
+    Examples
+    --------
+    >>> label("acd_paper"), label("wks")
+    ('ACD paper', 'WKS')
+    """
+    family, _, rest = name.partition("_")
+    return f"{family.upper()} {rest.replace('_', ' ')}".strip()

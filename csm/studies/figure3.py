@@ -1,0 +1,209 @@
+"""Figure 3: the error of matching by ACD over each of its parameters, with the others at a preset.
+
+All settings of one pair of shapes are measured together, because they share eigenproblems: the spectrum of a strength
+and an angle is computed once, with the greatest K that any setting asks for, and cut.  What a pair has measured is kept
+in ``figure3/`` of the folder of artefacts, so a killed study is started again and a longer list of values costs only
+the new ones.  For the same reason a Hydra multirun over single settings, such as ``-m`` with the option ``alphas`` set
+to ``[1],[5],[10]``, fills the same cells if its jobs share the folder, and one run over all values then draws them.
+
+Only training shapes are used: persons 0 to 7 of FAUST, shapes 0 to 79.
+"""
+
+from __future__ import annotations
+
+import logging
+import multiprocessing
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from csm._progress import progress_bar
+from csm._types import FloatArray
+from csm.data.datasets import find_set
+from csm.data.humansset import HumansSet
+from csm.data.shapeset import ShapeSet
+from csm.descriptors.chebyshev import ACD
+from csm.descriptors.presets import preset
+from csm.errors import ConfigError, DataError
+from csm.operators.geodesic import Method
+from csm.studies.acdsweep import Task
+from csm.studies.study import Context, Findings
+from csm.viewer.comparisons import Sweep, sweeps_figure
+from csm.viewer.figures import save_figure
+
+PERSONS, POSES = 8, 10
+"""Of the training shapes, which come person by person."""
+
+_log = logging.getLogger(__name__)
+LABELS = {"alpha": "strength α", "angles": "angles J", "k": "eigenpairs K", "order": "order D"}
+
+
+def run(
+    context: Context,
+    *,
+    shapes: ShapeSet | None = None,
+    base: str = "acd_paper",
+    alphas: Sequence[float] = (0, 1, 2, 5, 10, 20, 50, 100),
+    angles: Sequence[int] = (1, 2, 4, 5, 10, 20, 40),
+    ks: Sequence[int] = (5, 10, 20, 40, 70, 100),
+    orders: Sequence[int] = (1, 2, 4, 6, 8, 12, 16),
+    n_pairs: int = 16,
+    points: int = 250,
+    distance: Method = "exact",
+) -> Findings:
+    """Measure the mean error of all settings that differ from the preset in one parameter, and draw it.
+
+    Parameters
+    ----------
+    context
+        Where data and artefacts are.
+    shapes
+        The shapes; by default remeshed FAUST if it is below the root of the data, else remeshed built-in humans.
+    base
+        Preset of ACD that gives the other parameters.
+    alphas, angles, ks, orders
+        Values of alpha, J, K and D.  Angle counts that divide each other share eigenproblems.
+    n_pairs
+        Ordered pairs of two poses of one person, spread over the persons; even, as pairs are measured both ways.
+    points
+        Points measured per pair, drawn without replacement.
+    distance
+        Kind of geodesic distance of the errors.
+
+    Raises
+    ------
+    ConfigError
+        If `base` is no preset of ACD, a value is out of range or `n_pairs` is not an even number from 2.
+    """
+    sweeps = {"alpha": alphas, "angles": angles, "k": ks, "order": orders}
+    centre = preset(base)
+    if not isinstance(centre, ACD):
+        raise ConfigError(f"figure3: {base} is not a preset of ACD, whose parameters are studied")
+    wanted = {name: [vary(centre, name, value) for value in sorted(values)] for name, values in sweeps.items()}
+    shapes = shapes or _training_shapes(context)
+    couples = same_person_couples(shapes.names, n_pairs, context.seed)
+    folder = context.out / "figure3"
+    settings = list(dict.fromkeys(setting for values in wanted.values() for setting in values))
+    tasks = [Task(shapes, couple, folder, points, context.seed, distance) for couple in couples]
+    errors = _measure(tasks, settings, context.workers)
+    rows = [
+        {
+            "parameter": name,
+            "value": value,
+            "error": float(1000 * errors[setting].mean()),
+            "standard error": _standard_error(1000 * errors[setting]),
+            "columns": len(setting.columns),
+            "pairs": errors[setting].tolist(),
+        }
+        for name, values in sweeps.items()
+        for value, setting in zip(sorted(values), wanted[name], strict=True)
+    ]
+    path = context.out / "figure3.png"
+    save_figure(path, sweeps_figure([_sweep(name, rows, centre) for name in sweeps], "mean error (‰ of the diameter)"))
+    title = f"Error of nearest-neighbour matching by ACD over its parameters, others as in {base} ({shapes.name})."
+    shown = ("parameter", "value", "columns", "error", "standard error")
+    return Findings("figure3", title, shown, rows, _notes(couples, points, distance), (path,))
+
+
+def vary(centre: ACD, name: str, value: float) -> ACD:
+    """Return the setting with one parameter replaced; at alpha 0 all angles are alike, so one is left."""
+    if name == "alpha":
+        return replace(centre, alpha=float(value), angles=centre.angles if value else 1)
+    changes: dict[str, Any] = {name: int(value)}
+    return replace(centre, **changes)
+
+
+def same_person_couples(names: Sequence[str], n_pairs: int, seed: int) -> list[tuple[str, str]]:
+    """Return n_pairs / 2 couples of poses, spread evenly over the persons; no shape twice while there are others.
+
+    Parameters
+    ----------
+    names
+        Of all shapes, person by person; only those of the training persons are used.
+    n_pairs
+        Twice the number of couples, since each is matched both ways.
+    seed
+        Of the draw.
+
+    Raises
+    ------
+    ConfigError
+        If `n_pairs` is odd, not positive, or more than there are.
+
+    Examples
+    --------
+    >>> same_person_couples([str(i) for i in range(100)], 4, seed=0)
+    [('4', '6'), ('12', '19')]
+    """
+    people = [names[start : start + POSES] for start in range(0, PERSONS * POSES, POSES)]
+    people = [poses for poses in people if len(poses) >= 2]
+    most = 2 * sum(len(poses) // 2 for poses in people)
+    if n_pairs < 2 or n_pairs % 2 or n_pairs > most:
+        raise ConfigError(f"figure3: n_pairs={n_pairs}; wanted an even number from 2 to {most}")
+    rng = np.random.default_rng(seed)
+    orders = [rng.permutation(len(poses)) for poses in people]
+    found = []
+    for turn in range(POSES // 2):
+        for poses, order in zip(people, orders, strict=True):
+            if 2 * turn + 1 < len(poses):
+                found.append((poses[order[2 * turn]], poses[order[2 * turn + 1]]))
+    return found[: n_pairs // 2]
+
+
+def _training_shapes(context: Context) -> ShapeSet:
+    try:
+        return find_set(context.root, "FAUST_5k_remeshed")
+    except DataError as error:
+        _log.info("the built-in humans are taken: %s", error)
+        return HumansSet("remeshed", 5000, str(context.store.root))
+
+
+def _measure(tasks: Sequence[Task], settings: Sequence[ACD], workers: int) -> dict[ACD, FloatArray]:
+    """Return the mean errors of each setting over all ordered pairs, task by task, shape (n_pairs,)."""
+    found: dict[int, FloatArray] = {}
+    with progress_bar(total=len(tasks), desc="figure3", unit="couple") as bar:
+        if workers <= 1:
+            for i, task in enumerate(tasks):
+                found[i] = _errors(task, settings)
+                bar.update()
+        else:
+            with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+                jobs = {pool.submit(_errors, task, settings): i for i, task in enumerate(tasks)}
+                for job in as_completed(jobs):
+                    found[jobs[job]] = job.result()
+                    bar.update()
+    stacked = np.concatenate([found[i] for i in range(len(tasks))], axis=1)
+    return dict(zip(settings, stacked, strict=True))
+
+
+def _errors(task: Task, settings: Sequence[ACD]) -> FloatArray:
+    with threadpool_limits(1):
+        return task.errors(settings)
+
+
+def _standard_error(errors: FloatArray) -> float:
+    return float(errors.std(ddof=1) / np.sqrt(len(errors)))
+
+
+def _sweep(name: str, rows: Sequence[dict[str, Any]], centre: ACD) -> Sweep:
+    mine = [row for row in rows if row["parameter"] == name]
+    return Sweep(
+        LABELS[name],
+        [row["value"] for row in mine],
+        np.array([row["error"] for row in mine]),
+        np.array([row["standard error"] for row in mine]),
+        getattr(centre, name),
+    )
+
+
+def _notes(couples: Sequence[tuple[str, str]], points: int, distance: str) -> tuple[str, ...]:
+    return (
+        f"error: mean over {2 * len(couples)} ordered pairs of {points} points each, in thousandths of the target's "
+        f"geodesic diameter ({distance} distances); bars: one standard error over pairs.",
+        f"Pairs: two poses of one of the first {PERSONS} persons, both ways; no test shape is used.",
+        "At alpha 0 all angles give the same numbers, so a single one is used.",
+    )

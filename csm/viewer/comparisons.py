@@ -1,0 +1,106 @@
+"""Figures that compare methods or settings by numbers: dots in rows, and curves over parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from csm._types import FloatArray
+from csm.errors import ConfigError
+from csm.viewer.style import CYCLE, plain_axes
+
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+
+
+def dots_figure(names: Sequence[str], panels: Mapping[str, Mapping[str, Sequence[float]]]) -> Figure:
+    """Plot one row of dots per name, with a panel per quantity and a kind of dot per condition.
+
+    Parameters
+    ----------
+    names
+        Of the R rows, from top to bottom.
+    panels
+        Label of the quantity -> condition -> its R values.
+
+    Raises
+    ------
+    ConfigError
+        If there is nothing to draw or a condition has not one value per row.
+    """
+    wrong = [c for conditions in panels.values() for c, values in conditions.items() if len(values) != len(names)]
+    if not names or not panels or wrong:
+        raise ConfigError(f"dots figure: {wrong or 'nothing'} to draw; wanted {len(names)} values per condition")
+    figure = Figure(figsize=(1.2 + 2.9 * len(panels), 1.2 + 0.24 * len(names)), layout="constrained")
+    FigureCanvasAgg(figure)
+    grid = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    heights = np.arange(len(names))
+    for axes, (label, conditions) in zip(grid, panels.items(), strict=True):
+        for k, (condition, values) in enumerate(conditions.items()):
+            marker, color = _MARKERS[k % len(_MARKERS)], CYCLE[k % len(CYCLE)]
+            axes.plot(values, heights, marker, markersize=5, color=color, label=condition)
+        plain_axes(axes)
+        axes.set_xlim(left=0)
+        axes.set_xlabel(label, fontsize=8)
+        axes.tick_params(labelsize=8)
+    grid[0].set_yticks(heights, list(names))
+    grid[0].set_ylim(len(names) - 0.5, -0.5)
+    handles, labels = grid[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False, fontsize=8)
+    return figure
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """Means over one parameter.
+
+    Parameters
+    ----------
+    label
+        Of the parameter.
+    values
+        Shape (V,), ascending; drawn at equal distances, as a sweep chooses them.
+    means
+        Shape (V,).
+    spread
+        Shape (V,), half the length of the bars around the means, such as a standard error.
+    preset
+        The value that the other sweeps hold this parameter at; marked if it is among the values.
+    """
+
+    label: str
+    values: Sequence[float]
+    means: FloatArray
+    spread: FloatArray
+    preset: float
+
+
+def sweeps_figure(sweeps: Sequence[Sweep], quantity: str) -> Figure:
+    """Plot a quantity over several parameters, one panel each, on one vertical axis.
+
+    Raises
+    ------
+    ConfigError
+        If there is no sweep or one has no value.
+    """
+    if not sweeps or any(len(s.values) == 0 for s in sweeps):
+        raise ConfigError(f"sweeps figure: {[s.label for s in sweeps]}; wanted at least one value for each")
+    figure = Figure(figsize=(0.6 + 2.2 * len(sweeps), 2.7), layout="constrained")
+    FigureCanvasAgg(figure)
+    grid = figure.subplots(1, len(sweeps), sharey=True, squeeze=False)[0]
+    for axes, sweep in zip(grid, sweeps, strict=True):
+        place = np.arange(len(sweep.values))
+        axes.errorbar(place, sweep.means, sweep.spread, color=CYCLE[0], marker="o", markersize=4, capsize=2.5, lw=1.4)
+        chosen = np.flatnonzero(np.asarray(sweep.values) == sweep.preset)
+        axes.plot(place[chosen], sweep.means[chosen], "o", ms=9, mfc="none", mec=CYCLE[1], mew=1.6, label="preset")
+        axes.set_xticks(place, [f"{value:g}" for value in sweep.values])
+        axes.set_xlabel(sweep.label, fontsize=9)
+        axes.tick_params(labelsize=8)
+        plain_axes(axes)
+    grid[0].set_ylim(bottom=0)
+    grid[0].set_ylabel(quantity, fontsize=9)
+    grid[-1].legend(frameon=False, fontsize=8)
+    return figure

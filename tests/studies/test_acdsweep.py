@@ -1,0 +1,60 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from csm.descriptors.chebyshev import ACD
+from csm.studies import acdsweep
+from csm.studies.acdsweep import SharedOperators, Task, couple_errors
+from tests.studies.toys import Toys
+
+SETTINGS = [
+    ACD(angles=4, k=8, order=3),
+    ACD(angles=4, k=12, order=5),
+    ACD(angles=8, k=6, order=3),
+    ACD(alpha=0.0, angles=1, k=9),
+    ACD(alpha=0.0, angles=1, k=5),
+]
+
+
+@pytest.fixture
+def task(tmp_path) -> Task:
+    return Task(Toys(), ("toy0", "toy1"), tmp_path / "cells", points=30, distance="edge")
+
+
+def test_cut_spectra_give_the_same_descriptors():
+    shared = SharedOperators(Toys().load("toy0").mesh, SETTINGS)
+    for setting in SETTINGS:
+        np.testing.assert_allclose(setting(shared).values, setting(Toys().load("toy0").mesh).values, rtol=1e-6)
+
+
+def test_each_eigenproblem_is_solved_once(monkeypatch):
+    solved: list[int] = []
+    solve = acdsweep.Operators._solve
+    monkeypatch.setattr(acdsweep.Operators, "_solve", lambda self, m, k: solved.append(k) or solve(self, m, k))
+    shared = SharedOperators(Toys().load("toy0").mesh, SETTINGS)
+    for setting in SETTINGS:
+        setting(shared)
+    assert sorted(solved) == [6, 6, 6, 6, 9, 12, 12, 12, 12]  # the 4 angles of J=8 between those of J=4 need K=6 only
+
+
+def test_matching_a_shape_to_itself_has_no_error(task):
+    shape = Toys().load("toy0")
+    np.testing.assert_array_equal(couple_errors(shape, shape, SETTINGS[:1], task), [[0, 0]])
+
+
+def test_errors_go_both_ways(task):
+    shapes = [Toys().load(name) for name in ("toy0", "toy1")]
+    there = couple_errors(*shapes, SETTINGS, task)
+    back = couple_errors(*shapes[::-1], SETTINGS, task)
+    assert there.shape == (5, 2)
+    assert there.max() > 0
+    np.testing.assert_allclose(there, back[:, ::-1])
+
+
+def test_errors_of_other_meshes_are_not_taken_for_these(task):
+    first = task.errors(SETTINGS[:2])
+    np.testing.assert_array_equal(task.errors(SETTINGS[:2]), first)
+    moved = Task(Toys(("toy1", "toy0", "toy2")), task.couple, task.folder, 30, distance="edge")
+    assert moved.path == task.path
+    np.testing.assert_allclose(moved.errors(SETTINGS[:2]), first[:, ::-1])

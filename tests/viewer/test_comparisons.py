@@ -1,0 +1,49 @@
+"""Dots and curves stand where their numbers are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from csm.errors import ConfigError
+from csm.viewer.comparisons import Sweep, dots_figure, sweeps_figure
+
+
+def test_dots_stand_in_the_row_of_their_name_from_top_to_bottom():
+    figure = dots_figure(
+        ["a", "b", "c"], {"error": {"fine": [1, 2, 3], "coarse": [4, 5, 6]}, "time": {"fine": [7, 8, 9]}}
+    )
+    error, time = figure.axes
+    assert [text.get_text() for text in error.get_yticklabels()] == ["a", "b", "c"]
+    np.testing.assert_array_equal(error.get_lines()[1].get_xdata(), [4, 5, 6])
+    np.testing.assert_array_equal(error.get_lines()[1].get_ydata(), [0, 1, 2])
+    assert error.yaxis_inverted()
+    assert (error.get_xlabel(), time.get_xlabel()) == ("error", "time")
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["fine", "coarse"]
+    assert error.get_xlim()[0] == 0
+
+
+def test_dots_need_one_value_per_row():
+    with pytest.raises(ConfigError, match=r"\['fine'\] to draw; wanted 2 values"):
+        dots_figure(["a", "b"], {"error": {"fine": [1]}})
+
+
+def test_a_sweep_is_drawn_over_its_values_with_the_preset_marked():
+    sweeps = [
+        Sweep("K", [5, 10, 100], np.array([3.0, 2.0, 1.0]), np.array([0.1, 0.2, 0.3]), 10),
+        Sweep("D", [1, 2], np.array([5.0, 6.0]), np.zeros(2), 6),
+    ]
+    first, second = sweeps_figure(sweeps, "error").axes
+    np.testing.assert_array_equal(first.get_lines()[0].get_ydata(), [3, 2, 1])
+    assert [text.get_text() for text in first.get_xticklabels()] == ["5", "10", "100"]
+    ring, nothing = (axes.get_lines()[-1] for axes in (first, second))
+    assert (list(ring.get_xdata()), list(ring.get_ydata())) == ([1], [2.0])
+    assert len(nothing.get_xdata()) == 0
+    assert first.get_ylabel() == "error"
+    assert first.get_ylim() == second.get_ylim()
+    assert first.get_ylim()[0] == 0
+
+
+def test_a_sweep_needs_values():
+    with pytest.raises(ConfigError, match="at least one value"):
+        sweeps_figure([Sweep("K", [], np.zeros(0), np.zeros(0), 1)], "error")
