@@ -89,6 +89,18 @@ def test_the_loss_is_the_cross_entropy_of_the_labelled_rows(datamodule):
     torch.testing.assert_close(module.loss(module(sample.features, sample.basis), sample), expected)
 
 
+def test_the_loss_of_drawn_rows_is_that_of_all_rows_on_average(datamodule):
+    sample = next(iter(datamodule.val_dataloader()))
+    module, full = make(datamodule, loss_rows=20), make(datamodule)
+    with torch.no_grad():
+        x = module.eval()(sample.features, sample.basis)
+        assert module.loss(x, sample) == full.eval().loss(x, sample)  # a test of the network takes them all
+        module.train()
+        draws = torch.stack([module.loss(x, sample) for _ in range(400)])
+    assert draws.std() > 0
+    assert abs(draws.mean() - full.loss(x, sample)) < 5 * draws.std() / 20
+
+
 def test_a_checkpoint_is_plain_data_and_loads_without_a_config(trained, datamodule):
     module, _, path = trained
     content = torch.load(path, weights_only=True)
@@ -122,6 +134,8 @@ def test_unknown_names_are_errors_of_the_user(datamodule):
         make(datamodule, network={"name": "transformer"})
     with pytest.raises(ConfigError, match="format 99"):
         make(datamodule, format=99)
+    with pytest.raises(ConfigError, match="loss_rows=0"):
+        make(datamodule, loss_rows=0)
 
 
 def test_the_same_seed_gives_the_same_network(datamodule, tmp_path):
