@@ -17,54 +17,8 @@ from csm.evaluation.distances import MatchedPoints, target_errors
 from csm.evaluation.matching import nearest
 from csm.mesh.correspondence import ground_truth
 from csm.mesh.io import atomic_path
-from csm.mesh.shape import Mesh
 from csm.operators.bundle import Operators
-from csm.operators.frames import FrameKind
 from csm.operators.geodesic import Method
-from csm.operators.spectrum import Spectrum
-
-
-class SharedOperators(Operators):
-    """Operators that compute the spectrum of a strength and angle once, as long as any of the settings needs it.
-
-    Parameters
-    ----------
-    mesh
-        The shape.
-    settings
-        All that will be asked for; they have one kind of frame.
-    """
-
-    def __init__(self, mesh: Mesh, settings: Sequence[ACD]) -> None:
-        super().__init__(mesh)
-        self._longest: dict[tuple[float, float], int] = {}
-        for setting in settings:
-            for theta in setting.thetas:
-                key = _key(setting.alpha, theta)
-                self._longest[key] = max(setting.k, self._longest.get(key, 0))
-
-    def lbo(self, k: int) -> Spectrum:
-        """Return the `k` smallest eigenpairs of the isotropic Laplacian."""
-        return super().lbo(max(k, self._longest.get((0.0, 0.0), k))).first(k)
-
-    def albo(
-        self,
-        alpha: float,
-        theta: float,
-        k: int,
-        *,
-        frame: FrameKind = "line_field",
-        sweeps: int = 3,
-        smoothing: float = 0.08,
-    ) -> Spectrum:
-        """Return the `k` smallest eigenpairs of the anisotropic Laplacian, cut from the longest that is needed."""
-        key = _key(alpha, theta)
-        longest = max(k, self._longest.get(key, k))
-        return super().albo(*key, longest, frame=frame, sweeps=sweeps, smoothing=smoothing).first(k)
-
-
-def _key(alpha: float, theta: float) -> tuple[float, float]:
-    return float(alpha), round(float(theta), 12)  # pi/5 and 4 pi/20 are one angle
 
 
 @dataclass(frozen=True)
@@ -134,14 +88,15 @@ def couple_errors(first: Shape, second: Shape, settings: Sequence[ACD], task: Ta
     truth = ground_truth(first.truth, second.truth)
     chosen = np.random.default_rng(task.seed).permutation(len(truth.source))[: task.points]
     points = truth.source[chosen], truth.target[chosen]
-    operators = tuple(SharedOperators(shape.mesh, settings) for shape in (first, second))
-    matched: tuple[list[MatchedPoints], list[MatchedPoints]] = ([], [])
-    for setting in settings:
+    operators = Operators(first.mesh), Operators(second.mesh)
+    onto_first: dict[ACD, MatchedPoints] = {}
+    onto_second: dict[ACD, MatchedPoints] = {}
+    for setting in sorted(settings, key=lambda s: s.k, reverse=True):  # longer spectra serve the shorter ones
         here, there = (setting(shape).values.astype(np.float32) for shape in operators)
-        matched[0].append(MatchedPoints(points[1], nearest(here[points[0]], there)))
-        matched[1].append(MatchedPoints(points[0], nearest(there[points[1]], here)))
+        onto_second[setting] = MatchedPoints(points[1], nearest(here[points[0]], there))
+        onto_first[setting] = MatchedPoints(points[0], nearest(there[points[1]], here))
     errors = [
-        target_errors(shape.mesh, task.distance, "diameter", found)
-        for shape, found in zip((second, first), matched, strict=True)
+        target_errors(mesh, task.distance, "diameter", [matched[setting] for setting in settings])
+        for mesh, matched in ((second.mesh, onto_second), (first.mesh, onto_first))
     ]
     return np.array([[p.distance.mean() / e.lengths.diameter for p in e.errors] for e in errors]).T

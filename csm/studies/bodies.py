@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, TypeAlias
@@ -17,6 +17,7 @@ from csm.data.store import Store
 from csm.descriptors.presets import preset
 from csm.errors import ConfigError, DataError
 from csm.mesh.shape import Mesh
+from csm.operators.bundle import Operators
 from csm.studies.study import Context
 from csm.viewer.camera import Axis
 
@@ -153,9 +154,14 @@ def landmark_vertices(bodies: Bodies, shape: Shape) -> dict[str, int]:
     return found
 
 
-def describe(mesh: Mesh, name: str, store: Store) -> Float32Array:
-    """Return the descriptor called `name` in the presets for each vertex, (N, Q), from the store or computed."""
-    return compute_features(mesh, preset(name), store)
+def describe(mesh: Mesh, names: Sequence[str], store: Store) -> dict[str, Float32Array]:
+    """Return descriptors by their names in the presets, each (N, Q), from the store or computed on shared operators."""
+    operators = Operators(mesh)
+    chosen = {name: preset(name) for name in names}
+    # Those with the most eigenpairs come first, as these serve the others.
+    order = sorted(names, key=lambda name: chosen[name].parameters().get("k", 0), reverse=True)
+    values = {name: compute_features(mesh, chosen[name], store, operators) for name in order}
+    return {name: values[name] for name in names}
 
 
 def label(name: str) -> str:

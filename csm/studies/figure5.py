@@ -52,8 +52,7 @@ def run(
     mirror = None if shape.mirror is None else shape.mirror.as_template_to_shape().indices
     rows: list[dict[str, Any]] = []
     grid: dict[str, list[Panel]] = {}
-    for name in descriptors:
-        values = describe(shape.mesh, name, context.store)
+    for name, values in describe(shape.mesh, descriptors, context.store).items():
         distances = normalised([distances_from(values[v], values) for v in marks.values()])
         grid[label(name)] = [Panel(shape.mesh, d, v) for d, v in zip(distances, marks.values(), strict=True)]
         for (mark, _), distance in zip(marks.items(), distances, strict=True):

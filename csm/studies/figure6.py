@@ -54,12 +54,12 @@ def run(
         raise ConfigError(f"landmark={landmark!r} is unknown; there are {', '.join(bodies.landmarks)}")
     shapes = _shapes(bodies)
     true = {title: landmark_vertices(bodies, shape)[landmark] for title, shape in shapes.items()}
+    described = {title: describe(shape.mesh, descriptors, context.store) for title, shape in shapes.items()}
     rows: list[dict[str, Any]] = []
     grid: dict[str, list[Panel]] = {}
     for name in descriptors:
-        values = {title: describe(shape.mesh, name, context.store) for title, shape in shapes.items()}
-        query = values[_QUERY][true[_QUERY]]
-        raw = [distances_from(query, v) for v in values.values()]
+        query = described[_QUERY][name][true[_QUERY]]
+        raw = [distances_from(query, values[name]) for values in described.values()]
         unit = float(np.percentile(raw[0], 99))
         distances = dict(zip(shapes, normalised(raw, unit), strict=True))
         grid[label(name)] = [Panel(shapes[t].mesh, d, true[t]) for t, d in distances.items()]

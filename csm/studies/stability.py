@@ -49,16 +49,18 @@ def run(
     """
     bodies = find_bodies(source, context)
     original = bodies.original.load(bodies.body)
+    here = describe(original.mesh, descriptors, context.store)
     table: dict[tuple[str, str], dict[str, Any]] = {}
     for title, shapes in bodies.others.items():
         other = shapes.load(bodies.body)
+        there = describe(other.mesh, descriptors, context.store)
         pairs = ground_truth(original.truth, other.truth)
         matched: list[MatchedPoints] = []
         chosen = np.random.default_rng(context.seed).permutation(len(pairs.source))[:points]
         for name in descriptors:
-            here, there = (describe(shape.mesh, name, context.store) for shape in (original, other))
-            table[name, title] = {"descriptor": name, "mesh": title, **_changes(here, there, pairs, context.seed)}
-            found = nearest(here[pairs.source[chosen]], there)
+            changes = _changes(here[name], there[name], pairs, context.seed)
+            table[name, title] = {"descriptor": name, "mesh": title, **changes}
+            found = nearest(here[name][pairs.source[chosen]], there[name])
             matched.append(MatchedPoints(pairs.target[chosen], found))
         measured = target_errors(other.mesh, distance, "diameter", matched)
         for name, errors in zip(descriptors, measured.errors, strict=True):

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from csm.descriptors.presets import preset
 from csm.errors import ConfigError, DataError
 from csm.studies.bodies import (
     RIVALS,
@@ -59,10 +60,13 @@ def test_the_original_comes_first_among_resolutions():
 
 def test_descriptors_come_from_the_store_the_second_time(tmp_path):
     store, mesh = toy_context(tmp_path).store, toy_bodies().original.load("toy0").mesh
-    first = describe(mesh, "acd_isotropic", store)
+    names = ("acd_isotropic", "acd_paper")
+    first = describe(mesh, names, store)
     computed = store.computed
-    np.testing.assert_array_equal(describe(mesh, "acd_isotropic", store), first)
-    assert store.computed == computed > 0
+    for name, values in describe(mesh, names, store).items():
+        np.testing.assert_array_equal(values, first[name])
+        np.testing.assert_allclose(values, preset(name)(mesh).values, rtol=1e-5, atol=1e-4)
+    assert store.computed == computed == 2
 
 
 def test_every_rival_has_its_own_label():
