@@ -3,8 +3,11 @@
 All settings of one pair of shapes are measured together, because they share eigenproblems: the spectrum of a strength
 and an angle is computed once, with the greatest K that any setting asks for, and cut.  What a pair has measured is kept
 in ``figure3/`` of the folder of artefacts, so a killed study is started again and a longer list of values costs only
-the new ones.  For the same reason a Hydra multirun over single settings, such as ``-m`` with the option ``alphas`` set
-to ``[1],[5],[10]``, fills the same cells if its jobs share the folder, and one run over all values then draws them.
+the new ones.  For the same reason a Hydra multirun over single settings fills the same cells, since its jobs share the
+folder, and one run over all values then draws them in one picture::
+
+    csm reproduce figure3 -m '+figure3.alphas=[1],[5],[10]' '+figure3.ks=[10],[70]'
+    csm reproduce figure3
 
 Only training shapes are used: persons 0 to 7 of FAUST, shapes 0 to 79.
 """
@@ -103,7 +106,9 @@ def run(
         for value, setting in zip(sorted(values), wanted[name], strict=True)
     ]
     path = context.out / "figure3.png"
-    save_figure(path, sweeps_figure([_sweep(name, rows, centre) for name in sweeps], "mean error (‰ of the diameter)"))
+    save_figure(
+        path, sweeps_figure([_sweep(name, rows, centre) for name in sweeps], "mean error (thousandths of the diameter)")
+    )
     title = f"Error of nearest-neighbour matching by ACD over its parameters, others as in {base} ({shapes.name})."
     shown = ("parameter", "value", "columns", "error", "standard error")
     return Findings("figure3", title, shown, rows, _notes(couples, points, distance), (path,))

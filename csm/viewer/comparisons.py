@@ -41,7 +41,7 @@ def dots_figure(names: Sequence[str], panels: Mapping[str, Mapping[str, Sequence
     for axes, (label, conditions) in zip(grid, panels.items(), strict=True):
         for k, (condition, values) in enumerate(conditions.items()):
             marker, color = _MARKERS[k % len(_MARKERS)], CYCLE[k % len(CYCLE)]
-            axes.plot(values, heights, marker, markersize=5, color=color, label=condition)
+            axes.plot(values, heights, marker, markersize=5, color=color, label=condition, clip_on=False, zorder=3)
         plain_axes(axes)
         axes.set_xlim(left=0)
         axes.set_xlabel(label, fontsize=8)
