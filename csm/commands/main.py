@@ -15,7 +15,15 @@ COMMANDS = {
     "describe": "compute a descriptor of one mesh",
     "prepare": "fill, check or prune the store of bases and descriptors",
     "check": "list what is wrong with the meshes of a folder",
+    "reproduce": "make tables and figures of the paper again from data",
+    "bench": "measure how long the descriptors take",
 }
+
+WORDS = {"check": "folder", "reproduce": "targets", "bench": "targets"}
+"""Commands that take words without a key, with the option that the words are for."""
+
+_LISTS = {"targets"}
+_ALONE = {"-m", "--multirun", "-r", "--run", "--resolve"}  # options of Hydra that no value follows
 
 
 def usage() -> str:
@@ -46,8 +54,22 @@ def main() -> None:
 
 
 def _named(command: str, *arguments: str) -> list[str]:
-    """Let ``csm check FOLDER ...`` stand for ``csm check folder=FOLDER ...``."""
-    first, *others = arguments or ("",)
-    if command != "check" or not first or "=" in first or first.startswith("-"):
+    """Let ``csm check FOLDER ...`` stand for ``csm check folder=FOLDER ...``, and so on for `WORDS`.
+
+    Examples
+    --------
+    >>> _named("reproduce", "table1", "seed=1", "figure4", "--cfg", "job")
+    ['targets=[table1,figure4]', 'seed=1', '--cfg', 'job']
+    """
+    words: list[str] = []
+    others: list[str] = []
+    for before, argument in zip(("", *arguments), arguments, strict=False):
+        after_option = before.startswith("-") and before not in _ALONE
+        is_word = argument != "" and "=" not in argument and not argument.startswith("-") and not after_option
+        (words if is_word else others).append(argument)
+    option = WORDS.get(command)
+    if option is None or not words:
         return list(arguments)
-    return [f"folder='{first}'", *others]
+    if option in _LISTS:
+        return [f"{option}=[{','.join(words)}]", *others]
+    return [f"{option}='{words[0]}'", *words[1:], *others]

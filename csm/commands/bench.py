@@ -1,0 +1,28 @@
+"""``csm bench descriptors``: measure how long things take; a short way to the studies that do."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from omegaconf import DictConfig
+
+from csm.commands.app import command
+from csm.commands.reproduce import make_studies
+from csm.errors import ConfigError
+
+BENCHES = {"descriptors": "table2"}
+"""What can be measured, with the study that does it."""
+
+
+def run(cfg: DictConfig) -> dict[str, Any]:
+    """Make the study of every bench of ``targets``."""
+    unknown = [name for name in cfg.targets if name not in BENCHES]
+    if unknown or not cfg.targets:
+        raise ConfigError(f"bench: {', '.join(unknown) or 'nothing'} to measure; there is {', '.join(BENCHES)}")
+    return make_studies(cfg, [BENCHES[name] for name in cfg.targets])
+
+
+main = command("bench")(run)
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,62 @@
+"""Many descriptors of many shapes in the store, those of one shape made from the same eigenpairs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from csm.data.prepare import compute_features
+from csm.data.shapeset import ShapeSet
+from csm.data.store import Store
+from csm.descriptors.base import Descriptor
+from csm.errors import CsmError
+from csm.operators.bundle import Operators
+from csm.studies.pool import run_all
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    shapes: ShapeSet
+    name: str
+    descriptors: tuple[Descriptor, ...]
+    store: Store
+
+
+def fill(
+    shapes: ShapeSet, names: Sequence[str], descriptors: Sequence[Descriptor], store: Store, workers: int
+) -> dict[str, str]:
+    """Put descriptors of shapes into the store, as far as they are not there; return which shapes failed and why.
+
+    The descriptors of a shape share its eigenpairs, which are not kept.
+
+    Parameters
+    ----------
+    shapes, names
+        The shapes.
+    descriptors
+        Each is looked up, and kept, by its parameters.
+    store
+        Where they go.
+    workers
+        Processes of one thread.
+    """
+    tasks = [_Task(shapes, name, tuple(sorted(descriptors, key=_pairs, reverse=True)), store) for name in names]
+    reasons = run_all(_fill, tasks, lambda task: task.name, workers, what=f"describe {shapes.name}", unit="shape")
+    return {name: why for name, why in zip(names, reasons, strict=True) if why}
+
+
+def _fill(task: _Task) -> str:
+    try:
+        mesh = task.shapes.load(task.name).mesh
+        operators = Operators(mesh)
+        for descriptor in task.descriptors:
+            compute_features(mesh, descriptor, task.store, operators)
+    except CsmError as error:
+        return str(error)
+    return ""
+
+
+def _pairs(descriptor: Descriptor) -> int:
+    """Return how many eigenpairs a descriptor asks for; those that ask for most come first, and serve the others."""
+    without_constant = descriptor.name in ("weds", "gps")  # these count the pairs that are not constant
+    return int(descriptor.parameters().get("k", 0)) + without_constant
