@@ -88,7 +88,7 @@ def built_in_bodies(store: Store) -> Bodies:
         "5,000 vertices, remeshed": HumansSet("remeshed", 5000, root),
     }
     landmarks = {"left hand": 4395, "left knee": 5874, "head": 242}
-    return Bodies("built-in humans", HumansSet(), others, "s08_p02", "s08_p05", "s07_p00", landmarks, "z")
+    return Bodies("built-in humans", HumansSet(), others, "s08_p02", "s08_p04", "s07_p00", landmarks, "z")
 
 
 def faust_bodies(root: Path) -> Bodies:
@@ -109,7 +109,7 @@ def faust_bodies(root: Path) -> Bodies:
             _log.warning("%s is left out: %s", name, error)
     # Points of the SMPL template: tip of the left middle finger, front of the left knee, top of the head.
     landmarks = {"left hand": 2445, "left knee": 1043, "head": 411}
-    return Bodies("FAUST", original, others, "tr_reg_080", "tr_reg_082", "tr_reg_090", landmarks, "y")
+    return Bodies("FAUST", original, others, "tr_reg_080", "tr_reg_089", "tr_reg_090", landmarks, "y")
 
 
 def find_bodies(source: Source | Bodies, context: Context) -> Bodies:

@@ -15,16 +15,13 @@ Only training shapes are used: persons 0 to 7 of FAUST, shapes 0 to 79.
 from __future__ import annotations
 
 import logging
-import multiprocessing
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
-from csm._progress import progress_bar
 from csm._types import FloatArray
 from csm.data.datasets import find_set
 from csm.data.humansset import HumansSet
@@ -34,6 +31,7 @@ from csm.descriptors.presets import preset
 from csm.errors import ConfigError, DataError
 from csm.operators.geodesic import Method
 from csm.studies.acdsweep import Task
+from csm.studies.pool import run_all
 from csm.studies.study import Context, Findings
 from csm.viewer.comparisons import Sweep, sweeps_figure
 from csm.viewer.figures import save_figure
@@ -169,25 +167,15 @@ def _training_shapes(context: Context) -> ShapeSet:
 
 def _measure(tasks: Sequence[Task], settings: Sequence[ACD], workers: int) -> dict[ACD, FloatArray]:
     """Return the mean errors of each setting over all ordered pairs, task by task, shape (n_pairs,)."""
-    found: dict[int, FloatArray] = {}
-    with progress_bar(total=len(tasks), desc="figure3", unit="couple") as bar:
-        if workers <= 1:
-            for i, task in enumerate(tasks):
-                found[i] = _errors(task, settings)
-                bar.update()
-        else:
-            with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-                jobs = {pool.submit(_errors, task, settings): i for i, task in enumerate(tasks)}
-                for job in as_completed(jobs):
-                    found[jobs[job]] = job.result()
-                    bar.update()
-    stacked = np.concatenate([found[i] for i in range(len(tasks))], axis=1)
-    return dict(zip(settings, stacked, strict=True))
-
-
-def _errors(task: Task, settings: Sequence[ACD]) -> FloatArray:
-    with threadpool_limits(1):
-        return task.errors(settings)
+    errors = run_all(
+        partial(Task.errors, settings=settings),
+        tasks,
+        lambda task: " and ".join(task.couple),
+        workers,
+        what="figure3",
+        unit="couple",
+    )
+    return dict(zip(settings, np.concatenate(errors, axis=1), strict=True))
 
 
 def _standard_error(errors: FloatArray) -> float:

@@ -23,7 +23,7 @@ def run(
     *,
     source: Source | Bodies = "auto",
     descriptors: Sequence[str] = RIVALS,
-    landmark: str = "left hand",
+    landmark: str = "left knee",
     size: tuple[int, int] = (200, 310),
     blocks: int = 2,
 ) -> Findings:

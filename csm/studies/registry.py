@@ -31,6 +31,7 @@ STUDIES: Mapping[str, Study] = {
     "figure4": Study("share of points within an error, all descriptors", "csm.studies.figure4"),
     "figure5": Study("pictures of descriptor distances on one body", "csm.studies.figure5"),
     "figure6": Study("pictures of descriptor distances across bodies", "csm.studies.figure6"),
+    "stability": Study("change of all descriptors across resolutions of one body", "csm.studies.stability"),
 }
 """Every study; a new one is one line here and, if it has options, a section of conf/reproduce.yaml."""
 
