@@ -99,7 +99,7 @@ class SHOT:
         mesh = operators.mesh
         areas = operators.mass if self.area_weighted else np.ones(mesh.n_vertices)
         values = np.zeros((mesh.n_vertices, len(self.columns)))
-        normals = unit_rows(vertex_normals(mesh))
+        normals = mesh.vertex_normals
         radius = self.radius * float(np.sqrt(mesh.area))
         for ball in balls(mesh.vertices, radius, self.min_neighbours):
             weights = areas[ball.neighbours]
@@ -161,12 +161,6 @@ def local_frames(ball: Balls, weights: FloatArray, radius: float) -> FloatArray:
     vectors = np.linalg.eigh(spread)[1]
     x, z = (_to_the_many(vectors[:, :, k], ball, weights) for k in (2, 0))
     return np.stack([x, np.cross(z, x), z], axis=2)
-
-
-def vertex_normals(mesh: Mesh) -> FloatArray:
-    """Return the sum of face normals times twice their areas around each vertex, shape (N, 3)."""
-    corners, crosses = mesh.faces.ravel(), np.repeat(mesh.face_crosses, 3, axis=0)
-    return np.stack([np.bincount(corners, crosses[:, i], mesh.n_vertices) for i in range(3)], axis=1)
 
 
 def _to_the_many(axis: FloatArray, ball: Balls, weights: FloatArray) -> FloatArray:

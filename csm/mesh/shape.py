@@ -79,6 +79,16 @@ class Mesh:
         areas: FloatArray = 0.5 * np.linalg.norm(self.face_crosses, axis=1)
         return areas
 
+    @cached_property
+    def vertex_normals(self) -> FloatArray:
+        """Unit normal of every vertex, (N, 3): the area-weighted mean over its faces, zero where it has none."""
+        corner = self.faces.ravel()
+        sums = [np.bincount(corner, np.repeat(self.face_crosses[:, i], 3), self.n_vertices) for i in range(3)]
+        total = np.stack(sums, axis=1)
+        length = np.linalg.norm(total, axis=1, keepdims=True)
+        unit: FloatArray = np.divide(total, length, out=np.zeros_like(total), where=length > 0)
+        return unit
+
     @property
     def area(self) -> float:
         """Total surface area, in squared units of `vertices`."""

@@ -19,7 +19,7 @@ from csm.viewer.picture import Picture, contact_sheet, save_png
 from csm.viewer.raster import Fragments, fragments_at, interpolate, visible_faces
 from csm.viewer.shade import creases, edge_ink, encoded, light, linear
 
-__all__ = ["Picture", "View", "as_colors", "contact_sheet", "render", "save_png", "vertex_normals"]
+__all__ = ["Picture", "View", "as_colors", "contact_sheet", "render", "save_png"]
 
 DEFAULT_COLOR = (196, 203, 214)
 
@@ -84,16 +84,6 @@ def render(
     return _finish(surface, covered, size, supersample, background)
 
 
-def vertex_normals(mesh: Mesh) -> FloatArray:
-    """Unit normal per vertex, the area-weighted mean of its faces' normals; shape (N, 3), zero where it has no face."""
-    corner = mesh.faces.ravel()
-    sums = [np.bincount(corner, np.repeat(mesh.face_crosses[:, k], 3), mesh.n_vertices) for k in range(3)]
-    total = np.stack(sums, axis=1)
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    unit: FloatArray = np.divide(total, length, out=np.zeros_like(total), where=length > 0)
-    return unit
-
-
 def as_colors(colors: ArrayLike | None, n: int) -> FloatArray:
     """Return colours as floats from 0 to 1, shape (n, 3), from uint8 or floats, one for all or one for each.
 
@@ -128,7 +118,7 @@ def _require_drawable(mesh: Mesh, size: tuple[int, int], supersample: int, backg
 
 def _normals(mesh: Mesh, view: View, seen: Fragments) -> Float32Array:
     """Return the smooth normal at each fragment in the viewer's frame, shape (P, 3), not of unit length."""
-    normals = (vertex_normals(mesh) @ rotation(mesh, view).T).astype(np.float32)
+    normals = (mesh.vertex_normals @ rotation(mesh, view).T).astype(np.float32)
     return interpolate(seen.weights, normals, mesh.faces[seen.face])
 
 

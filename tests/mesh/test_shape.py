@@ -25,6 +25,13 @@ def test_area_of_known_surfaces():
     assert plane().area == pytest.approx(np.prod(np.ptp(plane().vertices, axis=0)[:2]))
 
 
+def test_vertex_normals_of_a_sphere_point_outwards_and_a_loose_vertex_has_none():
+    mesh = sphere(3)
+    assert (mesh.vertex_normals * mesh.vertices).sum(axis=1).min() > 0.999
+    loose = Mesh(np.vstack([TRIANGLE, [5, 5, 5]]), [[0, 1, 2]])
+    np.testing.assert_array_equal(loose.vertex_normals, [[0, 0, 1]] * 3 + [[0, 0, 0]])
+
+
 def test_nothing_can_be_changed_afterwards_not_even_through_the_arrays_given():
     vertices = TRIANGLE.copy()
     mesh = Mesh(vertices, [[0, 1, 2]])

@@ -8,7 +8,7 @@ import pytest
 from csm.errors import ConfigError, MeshError
 from csm.mesh.shape import Mesh
 from csm.viewer.camera import View
-from csm.viewer.render import as_colors, render, vertex_normals
+from csm.viewer.render import as_colors, render
 from tests.shapes import sphere
 
 FLAT = View(elevation=0)
@@ -108,11 +108,6 @@ def test_shape_outside_the_picture_and_flat_shapes_are_drawn_without_failing() -
     assert (render(far, RED, size=(20, 20), view=FLAT, lighting=False)[10, 10] == RED).all()
     edge_on = render(sheets(0.0), size=(20, 20), view=View(azimuth=90, elevation=0))
     assert np.isfinite(edge_on).all()
-
-
-def test_vertex_normals_of_a_sphere_point_outwards() -> None:
-    mesh = sphere(3)
-    assert (vertex_normals(mesh) * mesh.vertices).sum(axis=1).min() > 0.999
 
 
 def test_colours_are_taken_as_bytes_or_fractions() -> None:
