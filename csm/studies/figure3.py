@@ -92,14 +92,7 @@ def run(
     tasks = [Task(shapes, couple, folder, points, context.seed, distance) for couple in couples]
     errors = _measure(tasks, settings, context.workers)
     rows = [
-        {
-            "parameter": name,
-            "value": value,
-            "error": float(1000 * errors[setting].mean()),
-            "standard error": _standard_error(1000 * errors[setting]),
-            "columns": len(setting.columns),
-            "pairs": errors[setting].tolist(),
-        }
+        _row(name, value, setting, 1000 * errors[setting])
         for name, values in sweeps.items()
         for value, setting in zip(sorted(values), wanted[name], strict=True)
     ]
@@ -178,8 +171,16 @@ def _measure(tasks: Sequence[Task], settings: Sequence[ACD], workers: int) -> di
     return dict(zip(settings, np.concatenate(errors, axis=1), strict=True))
 
 
-def _standard_error(errors: FloatArray) -> float:
-    return float(errors.std(ddof=1) / np.sqrt(len(errors)))
+def _row(name: str, value: float, setting: ACD, errors: FloatArray) -> dict[str, Any]:
+    """Return what is written of one setting, from its errors over ordered pairs in thousandths."""
+    return {
+        "parameter": name,
+        "value": value,
+        "columns": len(setting.columns),
+        "error": float(errors.mean()),
+        "standard error": float(errors.std(ddof=1) / np.sqrt(len(errors))),
+        "pairs": errors.tolist(),
+    }
 
 
 def _sweep(name: str, rows: Sequence[dict[str, Any]], centre: ACD) -> Sweep:

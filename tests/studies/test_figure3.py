@@ -28,7 +28,7 @@ def test_every_value_has_a_row_and_the_preset_is_one_setting(tmp_path):
     assert of_preset[0] == of_preset[1] == of_preset[2]
     assert all(len(row["pairs"]) == 4 for row in found.rows)
     assert found.rows[0]["columns"] == 7
-    assert found.rows[0]["error"] == pytest.approx(1000 * np.mean(found.rows[0]["pairs"]))
+    assert found.rows[0]["error"] == pytest.approx(np.mean(found.rows[0]["pairs"]))
     assert found.pictures[0].is_file()
 
 
