@@ -56,6 +56,8 @@ def _program(path: str) -> str:
     if resolved.suffix == ".py" and resolved.is_relative_to(_PACKAGE):
         inside = resolved.relative_to(_PACKAGE.parent).with_suffix("")
         return f"python -m {'.'.join(inside.parts).removesuffix('.__main__')}"
+    if resolved.name.startswith("csm "):  # the program with its command, as `csm.commands.main` calls it
+        return resolved.name
     return shlex.quote(resolved.name)
 
 

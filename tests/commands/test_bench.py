@@ -1,0 +1,41 @@
+from __future__ import annotations
+
+import sys
+
+import pytest
+from hydra.core.global_hydra import GlobalHydra
+
+from csm.commands import bench
+from csm.commands.main import main
+from csm.studies.registry import STUDIES
+
+
+@pytest.fixture
+def run(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words: str) -> None:
+        monkeypatch.setattr(sys, "argv", ["csm", "bench", *words])
+        GlobalHydra.instance().clear()
+        main()
+
+    return call
+
+
+def test_descriptors_are_table_2_with_its_options(run, monkeypatch):
+    asked = []
+    monkeypatch.setattr(bench, "make_studies", lambda cfg, names: asked.append((names, cfg.table2.sizes)) or {})
+    run("descriptors", "table2.sizes=[500]", "hydra.run.dir=job")
+    assert asked == [(["table2"], [500])]
+
+
+@pytest.mark.parametrize("words", [[], ["meshes"]])
+def test_anything_else_is_refused_with_what_there_is(run, capsys, words):
+    with pytest.raises(SystemExit) as stopped:
+        run(*words, "hydra.run.dir=job")
+    assert stopped.value.code == 2
+    assert "there is descriptors" in capsys.readouterr().err
+
+
+def test_a_bench_is_a_study():
+    assert set(bench.BENCHES.values()) <= set(STUDIES)

@@ -1,0 +1,91 @@
+from __future__ import annotations
+
+import importlib
+import json
+import sys
+
+import pytest
+from hydra import compose, initialize_config_dir
+from hydra.core.global_hydra import GlobalHydra
+from omegaconf import OmegaConf
+
+from csm.commands.app import config_folder
+from csm.commands.main import main
+from csm.commands.reproduce import options_of
+from csm.errors import ConfigError
+from csm.studies.registry import STUDIES
+from tests.remeshedset import write_faust
+
+
+@pytest.fixture
+def run(monkeypatch, tmp_path):
+    """Return a function that runs ``csm WORDS`` in a folder with toy data."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("CSM_CACHE", str(tmp_path / "store"))
+    monkeypatch.setenv("COLUMNS", "200")
+
+    def call(*words: str) -> None:
+        monkeypatch.setattr(sys, "argv", ["csm", *words])
+        GlobalHydra.instance().clear()
+        main()
+
+    return call
+
+
+def test_words_are_studies_and_each_leaves_its_files(run, tmp_path, capsys):
+    write_faust(tmp_path / "data" / "FAUST")
+    options = ["table1.sets=[faust]", "table1.descriptors=[acd_paper]", "table1.exact_points=10", "workers=1"]
+    run("reproduce", "table1", *options, "figure4", "results=shown", "hydra.run.dir=job")
+    files = {"table1.json", "table1.csv", "table1.md", "figure4.json", "figure4.csv", "figure4.md", "figure4.png"}
+    assert files <= {path.name for path in (tmp_path / "outputs/reproduce").iterdir()}
+    assert files == {path.name for path in (tmp_path / "shown").iterdir()}
+    record = json.loads((tmp_path / "shown/table1.json").read_text())
+    assert record["command"].startswith("csm reproduce 'targets=[table1,figure4]' ")
+    assert "| acd_paper | 77 |" in capsys.readouterr().out
+    result = json.loads((tmp_path / "job/result.json").read_text())
+    assert result["status"] == "ok"
+    assert {"seconds/table1", "seconds/figure4"} <= set(result)
+
+
+def test_help_lists_the_studies(run, capsys):
+    with pytest.raises(SystemExit) as stopped:
+        run("reproduce", "--help")
+    assert not stopped.value.code
+    text = capsys.readouterr().out
+    for name, study in STUDIES.items():
+        assert f"{name} " in text
+        assert study.purpose in text
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "needs names of studies"),
+        (["table9"], "there is no study 'table9'"),
+        (["table1", "+table1.colour=red"], "table1 has no option colour"),
+        (["table1", "data.root=nowhere"], "none of the sets"),
+    ],
+)
+def test_errors_are_one_paragraph_and_status_2(run, capsys, words, message):
+    with pytest.raises(SystemExit) as stopped:
+        run("reproduce", *words, "hydra.run.dir=failed")
+    assert stopped.value.code == 2
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_the_options_of_the_configuration_are_those_of_the_study(name):
+    with initialize_config_dir(str(config_folder()), version_base="1.3"):
+        cfg = compose("reproduce")
+    assert name in cfg
+    options = options_of(cfg, name)
+    defaults = importlib.import_module(STUDIES[name].module).run.__kwdefaults__ or {}
+    for key, value in options.items():
+        given = list(defaults[key]) if isinstance(defaults[key], tuple) else defaults[key]
+        assert value == given, f"{name}.{key}: {value} in the configuration, {given} in the code"
+
+
+def test_an_option_that_the_study_does_not_have_is_refused():
+    cfg = OmegaConf.create({"figure4": {"exact_points": 3, "nothing": 1}})
+    with pytest.raises(ConfigError, match="figure4 has no option nothing; it has sets"):
+        options_of(cfg, "figure4")
