@@ -54,14 +54,8 @@ def run(
         for operator, evals in _spectra(mesh, context, alpha, degrees, k).items():
             spectra.setdefault(operator, {})[title] = evals
     finest = max(meshes, key=lambda title: meshes[title].n_vertices)
-    rows: list[dict[str, Any]] = [
-        {
-            "operator": operator,
-            "mesh": title,
-            "mean change %": float(np.abs(deviation(evals, lines[finest])).mean()),
-            "largest change %": float(np.abs(deviation(evals, lines[finest])).max()),
-            "eigenvalues": evals.tolist(),
-        }
+    rows = [
+        _row(operator, title, evals, lines[finest])
         for operator, lines in spectra.items()
         for title, evals in lines.items()
     ]
@@ -78,6 +72,17 @@ def run(
         ),
         (path,),
     )
+
+
+def _row(operator: str, title: str, evals: FloatArray, reference: FloatArray) -> dict[str, Any]:
+    change = np.abs(deviation(evals, reference))
+    return {
+        "operator": operator,
+        "mesh": title,
+        "mean change %": float(change.mean()),
+        "largest change %": float(change.max()),
+        "eigenvalues": evals.tolist(),
+    }
 
 
 def _spectra(mesh: Mesh, context: Context, alpha: float, degrees: Sequence[float], k: int) -> dict[str, FloatArray]:
