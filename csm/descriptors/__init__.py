@@ -17,6 +17,7 @@ from csm.descriptors.heat import HKS
 from csm.descriptors.presets import PRESETS, from_parameters, preset
 from csm.descriptors.shot import SHOT
 from csm.descriptors.smwd import SMWD
+from csm.descriptors.stack import Stack
 from csm.descriptors.wave import WKS
 from csm.descriptors.weds import WEDS
 from csm.descriptors.wft import WFT
@@ -37,6 +38,7 @@ __all__ = [
     "WKS",
     "Descriptor",
     "Features",
+    "Stack",
     "from_parameters",
     "preset",
 ]

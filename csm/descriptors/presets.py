@@ -15,6 +15,7 @@ from csm.descriptors.gps import GPS
 from csm.descriptors.heat import HKS
 from csm.descriptors.shot import SHOT
 from csm.descriptors.smwd import SMWD
+from csm.descriptors.stack import Stack
 from csm.descriptors.wave import WKS
 from csm.descriptors.weds import WEDS
 from csm.descriptors.wft import WFT
@@ -24,6 +25,7 @@ PRESETS: dict[str, Descriptor] = {
     "acd_paper": ACD(),
     "acd_release": ACD.release(),
     "acd_release_frame": ACD.release(frame="released", sweeps=10),
+    "acd_both": Stack({"paper": ACD(), "release": ACD.release()}),
     "acd_isotropic": ACD(alpha=0.0, angles=1),
     "hks": HKS(),
     "wks": WKS(),
@@ -81,6 +83,8 @@ def from_parameters(name: str, **parameters: Any) -> Descriptor:
     >>> from_parameters("hks", **HKS(n_times=16).parameters()) == HKS(n_times=16)
     True
     """
+    if name == Stack.name:
+        return Stack({key: from_parameters(**part) for key, part in parameters["parts"].items()})
     if name not in _FAMILIES:
         raise ConfigError(f"there is no descriptor family {name!r}; there are {', '.join(_FAMILIES)}")
     try:

@@ -13,7 +13,7 @@ from tests.shapes import blob, rotation
 
 EIGENPAIRS = {"k": 24}  # enough for a property, few enough for all presets
 WORLD_AXES = ["acd_release_frame"]  # reproduces a published dependence on the world axes
-ANISOTROPIC = ["acd_paper", "acd_release", "acd_release_frame", "asmwd", "awft"]
+ANISOTROPIC = ["acd_both", "acd_paper", "acd_release", "acd_release_frame", "asmwd", "awft"]
 
 
 def values(name: str, mesh: Mesh) -> np.ndarray:

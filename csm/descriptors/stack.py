@@ -1,0 +1,58 @@
+"""Several descriptors side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from csm.descriptors.base import Descriptor, Features, as_operators
+from csm.errors import ConfigError
+from csm.mesh.shape import Mesh
+from csm.operators.bundle import Operators
+
+
+@dataclass(frozen=True)
+class Stack:
+    """The columns of several descriptors, one after the other: a richer input for a network.
+
+    Nothing is rescaled, so for nearest neighbours the descriptor with the greatest numbers decides.
+
+    Parameters
+    ----------
+    parts
+        The descriptors by name, at least one; they share the eigensystems of the shape.
+
+    Raises
+    ------
+    ConfigError
+        If there is none.
+
+    Examples
+    --------
+    >>> from csm.descriptors import HKS, WKS
+    >>> Stack({"heat": HKS(n_times=2), "wave": WKS()}).parameters()["parts"]["heat"]
+    {'name': 'hks', 'k': 300, 'n_times': 2, 'scaled': True}
+    """
+
+    parts: Mapping[str, Descriptor]
+
+    name: ClassVar[str] = "stack"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "parts", dict(self.parts))
+        if not self.parts:
+            raise ConfigError("a stack needs at least one descriptor")
+
+    def __call__(self, shape: Mesh | Operators) -> Features:
+        """Return the descriptor of every vertex, (N, sum of the parts' columns)."""
+        operators = as_operators(shape)
+        found = {name: part(operators) for name, part in self.parts.items()}
+        columns = (f"{name} {column}" for name, features in found.items() for column in features.columns)
+        return Features(np.hstack([features.values for features in found.values()]), tuple(columns))
+
+    def parameters(self) -> dict[str, Any]:
+        """Return the family and every parameter of every part as plain data."""
+        return {"parts": {name: {"name": part.name, **part.parameters()} for name, part in self.parts.items()}}
