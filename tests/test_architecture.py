@@ -75,7 +75,7 @@ TESTED_ELSEWHERE = {
 }
 """Modules without a test file of their own, with the one that tests them through what uses them."""
 
-OF_SEVERAL_MODULES = {"commands.pipeline"}
+OF_SEVERAL_MODULES = {"commands.pipeline", "descriptors.invariants"}
 """Test files without a module of their own, besides those of the whole, which lie directly in tests/."""
 
 
