@@ -98,7 +98,9 @@ def test_a_matrix_names_experiments_that_compose(name):
 
 @pytest.mark.parametrize("name", names("descriptor"))
 def test_a_descriptor_file_is_the_preset_of_that_name(name):
-    assert instantiate(compose("train", [f"descriptor={name}"]).descriptor) == PRESETS[name]
+    made = instantiate(compose("train", [f"descriptor={name}"]).descriptor)
+    assert made == PRESETS[name]
+    assert made.parameters() == PRESETS[name].parameters()
 
 
 @pytest.mark.parametrize("name", names("model"))
