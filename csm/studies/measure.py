@@ -4,11 +4,11 @@ The exact distances that twelve descriptors ask for on a target of 5000 vertices
 vertex is propagated from once for all of them: descriptors of which some take left for right ask for far vertices from
 almost every point, so stopping early saves little.  A shortest path along edges costs 1 ms, or 4 s for all.  It is 4 to
 6 % too long, by much the same factor everywhere: after scaling, what is left has a standard deviation of 0.003 to 0.013
-of the diameter.  So `errors_on_target` measures some
-template points exactly and all points along edges, and scales the latter by the ratio of the two where both are known,
-one ratio per descriptor and target (the ratio estimator of survey sampling, Cochran, "Sampling techniques", 1977,
-chapter 6).  `Errors.variance` says what that leaves uncertain; on a pair of FAUST, means
-of 13 to 158 thousandths were off by 0.13 on average with 100 exact points, at a twelfth of the cost.
+of the diameter.  So `errors_on_target` measures some template points exactly and all points along edges, and scales the
+latter by the ratio of the two where both are known, one ratio per descriptor and target (the ratio estimator of survey
+sampling, Cochran, "Sampling techniques", 1977, chapter 6).  `Errors.variance` says what that leaves uncertain.  On a
+pair of FAUST, means of 13 to 158 thousandths were off by 0.13 on average with 100 exact points, at a twelfth of the
+cost.
 """
 
 from __future__ import annotations
