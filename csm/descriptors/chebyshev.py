@@ -38,6 +38,8 @@ class ACD:
         Scale each row to unit length.
     frame, sweeps, smoothing
         Of `csm.operators.frames.face_frames`.
+    centred
+        Subtract from each column its mean over the surface, which differs from pose to pose.
 
     Raises
     ------
@@ -66,6 +68,7 @@ class ACD:
     frame: FrameKind = "line_field"
     sweeps: int = 3
     smoothing: float = 0.08
+    centred: bool = False
 
     name: ClassVar[str] = "acd"
 
@@ -74,6 +77,14 @@ class ACD:
             raise ConfigError(f"{self}: wanted alpha >= 0, angles >= 1, k >= 2 and order >= 0")
         if self.alpha == 0 and self.angles != 1:
             raise ConfigError(f"{self}: at alpha=0 all {self.angles} blocks would be equal; set angles=1")
+
+    @classmethod
+    def own(cls) -> ACD:
+        """Return csm's own settings: smooth frames, T_0 .. T_8, centred columns.
+
+        Chosen by nearest-neighbour matching of FAUST shapes 0 to 79 and of TOSCA's cats, dogs and wolves.
+        """
+        return cls(order=8, frame="smooth", centred=True)
 
     @classmethod
     def release(cls, *, frame: FrameKind = "line_field", sweeps: int = 3) -> ACD:
@@ -94,6 +105,8 @@ class ACD:
         """Return the descriptor of every vertex, (N, J (D + 1)), in units of 1/area unless normalised."""
         operators = as_operators(shape)
         values = np.hstack([chebyshev_block(self._spectrum(operators, theta), self.order) for theta in self.thetas])
+        if self.centred:
+            values -= operators.mass @ values / operators.mass.sum()
         return Features(unit_rows(values) if self.normalise else values, self.columns)
 
     def parameters(self) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from csm.descriptors.wft import WFT
 from csm.errors import ConfigError
 
 PRESETS: dict[str, Descriptor] = {
+    "acd": ACD.own(),
     "acd_paper": ACD(),
     "acd_release": ACD.release(),
     "acd_release_frame": ACD.release(frame="released", sweeps=10),

@@ -24,6 +24,7 @@ from csm.viewer.camera import Axis
 Source: TypeAlias = Literal["auto", "faust", "humans"]
 
 RIVALS = (
+    "acd",
     "acd_paper",
     "acd_release",
     "asmwd",
@@ -37,7 +38,7 @@ RIVALS = (
     "smwd",
     "shot",
 )
-"""Presets of the descriptors that the paper compares, in the order of its Table 1; of ACD both settings."""
+"""Presets of the descriptors that the paper compares, in the order of its Table 1; of ACD also csm's own settings."""
 
 _FAUST_SETS = ("FAUST_10000", "FAUST_15000", "FAUST_5k_remeshed")
 _log = logging.getLogger(__name__)

@@ -104,6 +104,13 @@ def test_as_many_pairs_as_components_is_an_error():
         ACD(k=2)(twins)
 
 
+def test_centred_columns_have_no_mean_over_the_surface():
+    operators = Operators(blob(3))
+    plain, centred = (ACD(angles=3, centred=flag)(operators).values for flag in (False, True))
+    np.testing.assert_allclose(operators.mass @ centred, 0, atol=1e-12)
+    np.testing.assert_allclose(plain - centred, np.tile(operators.mass @ plain, (len(plain), 1)), atol=1e-12)
+
+
 @pytest.mark.data
 def test_released_settings_reproduce_the_authors_descriptor(data_set):
     """Median row error 0.053 here; what is left follows LAPACK's arbitrary signs in the authors' frame."""

@@ -11,7 +11,7 @@ from csm.descriptors import PRESETS, Descriptor
 from tests.descriptors.invariances import CHECKS, mirrored, rigid_motion
 from tests.shapes import blob
 
-LEFT_RIGHT = ["acd_both", "acd_paper", "acd_release", "acd_release_frame", "asmwd", "awft", "shot"]
+LEFT_RIGHT = ["acd", "acd_both", "acd_paper", "acd_release", "acd_release_frame", "asmwd", "awft", "shot"]
 
 
 def small(name: str) -> Descriptor:
@@ -22,7 +22,9 @@ def small(name: str) -> Descriptor:
 
 
 @pytest.mark.parametrize("check", CHECKS, ids=lambda c: c.__name__)
-@pytest.mark.parametrize("name", ["acd_paper", "acd_release", "acd_isotropic", "hks", "wks", "wks_functional_map"])
+@pytest.mark.parametrize(
+    "name", ["acd", "acd_paper", "acd_release", "acd_isotropic", "hks", "wks", "wks_functional_map"]
+)
 def test_first_descriptors_pass_the_checks_of_the_others(name, check):
     check(small(name))
 

@@ -30,7 +30,7 @@ def test_every_preset_comes_back_from_its_record(name):
 
 def test_unknown_names_parameters_and_values_are_refused():
     with pytest.raises(ConfigError, match="acd_paper"):
-        preset("acd")
+        preset("acdc")
     with pytest.raises(ConfigError, match=r"no parameter q; it has alpha"):
         preset("acd_paper", q=1)
     with pytest.raises(ConfigError, match="wanted"):
