@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from csm.studies.bodies import RIVALS
+from csm.studies.bodies import RIVALS, label
 from csm.studies.cells import Cell
 from csm.studies.published import SETS
 from csm.studies.study import Context, Findings
@@ -72,7 +72,9 @@ def curves_figure(panels: Mapping[str, Mapping[str, Cell]]) -> Figure:
     row[0].set_ylabel("matches within the error (%)")
     lines = {str(line.get_label()): line for line in row[0].get_lines()}
     order = sorted(lines, key=lambda name: next(iter(panels.values()))[name].age)
-    figure.legend([lines[name] for name in order], order, loc="outside right center", frameon=False)
+    figure.legend(
+        [lines[name] for name in order], [label(name) for name in order], loc="outside right center", frameon=False
+    )
     return figure
 
 
