@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from csm._types import FloatArray
+from csm.descriptors.angular import ByAngle
 from csm.descriptors.base import Features, as_operators
 from csm.descriptors.chebyshev import unit_rows
 from csm.descriptors.filters import filter_names, meyer_filters, unit_sums
@@ -19,7 +20,7 @@ from csm.operators.spectrum import Spectrum
 
 
 @dataclass(frozen=True)
-class ASMWD:
+class ASMWD(ByAngle):
     r"""Meyer wavelets of the anisotropic spectrum, each at its own centre; one block of columns per angle.
 
     For the angle theta_j = pi j / J, the eigenpairs of B(alpha, theta_j) and the filters g_s of
@@ -77,13 +78,7 @@ class ASMWD:
     def __post_init__(self) -> None:
         if self.angles < 1 or self.k < 2 or self.n_filters < 2 or not self.alpha >= 0:
             raise ConfigError(f"{self}: wanted alpha >= 0, angles >= 1, k >= 2 and n_filters >= 2")
-        if self.alpha == 0 and self.angles != 1:
-            raise ConfigError(f"{self}: at alpha=0 all {self.angles} blocks would be equal; set angles=1")
-
-    @property
-    def thetas(self) -> FloatArray:
-        """The angles in radians, shape (J,)."""
-        return np.arange(self.angles, dtype=np.float64) * (np.pi / self.angles)
+        self._require_different_angles()
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -99,11 +94,6 @@ class ASMWD:
     def parameters(self) -> dict[str, Any]:
         """Return every parameter as plain data."""
         return asdict(self)
-
-    def _spectrum(self, operators: Operators, theta: float) -> Spectrum:
-        if self.alpha == 0:
-            return operators.lbo(self.k)
-        return operators.albo(self.alpha, theta, self.k, frame=self.frame, sweeps=self.sweeps, smoothing=self.smoothing)
 
 
 def meyer_block(spectrum: Spectrum, n_filters: int) -> FloatArray:

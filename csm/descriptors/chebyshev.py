@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from csm._types import FloatArray
+from csm.descriptors.angular import ByAngle
 from csm.descriptors.base import Features, as_operators
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
@@ -17,7 +18,7 @@ from csm.operators.spectrum import Spectrum
 
 
 @dataclass(frozen=True)
-class ACD:
+class ACD(ByAngle):
     r"""Chebyshev polynomials of the anisotropic spectrum, one block of columns per angle.
 
     For the angle theta_j = pi j / J and the eigenpairs of B(alpha, theta_j),
@@ -75,8 +76,7 @@ class ACD:
     def __post_init__(self) -> None:
         if self.angles < 1 or self.k < 2 or self.order < 0 or not self.alpha >= 0:
             raise ConfigError(f"{self}: wanted alpha >= 0, angles >= 1, k >= 2 and order >= 0")
-        if self.alpha == 0 and self.angles != 1:
-            raise ConfigError(f"{self}: at alpha=0 all {self.angles} blocks would be equal; set angles=1")
+        self._require_different_angles()
 
     @classmethod
     def own(cls) -> ACD:
@@ -90,11 +90,6 @@ class ACD:
     def release(cls, *, frame: FrameKind = "line_field", sweeps: int = 3) -> ACD:
         """Return the settings of the authors' code; with ``frame="released", sweeps=10`` also its frame."""
         return cls(alpha=4.0, angles=8, k=70, order=5, normalise=True, frame=frame, sweeps=sweeps)
-
-    @property
-    def thetas(self) -> FloatArray:
-        """The angles in radians, shape (J,)."""
-        return np.arange(self.angles, dtype=np.float64) * (np.pi / self.angles)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -112,11 +107,6 @@ class ACD:
     def parameters(self) -> dict[str, Any]:
         """Return every parameter as plain data."""
         return asdict(self)
-
-    def _spectrum(self, operators: Operators, theta: float) -> Spectrum:
-        if self.alpha == 0:
-            return operators.lbo(self.k)
-        return operators.albo(self.alpha, theta, self.k, frame=self.frame, sweeps=self.sweeps, smoothing=self.smoothing)
 
 
 def chebyshev_block(spectrum: Spectrum, order: int) -> FloatArray:

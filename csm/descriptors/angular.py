@@ -1,0 +1,36 @@
+"""What the descriptors share that have one block of columns per angle of the anisotropic Laplacian."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from csm._types import FloatArray
+from csm.errors import ConfigError
+from csm.operators.bundle import Operators
+from csm.operators.frames import FrameKind
+from csm.operators.spectrum import Spectrum
+
+
+class ByAngle:
+    """Angles and spectra of a descriptor with these parameters, which its dataclass has as fields."""
+
+    alpha: float
+    angles: int
+    k: int
+    frame: FrameKind
+    sweeps: int
+    smoothing: float
+
+    @property
+    def thetas(self) -> FloatArray:
+        """The angles in radians, shape (J,)."""
+        return np.arange(self.angles, dtype=np.float64) * (np.pi / self.angles)
+
+    def _require_different_angles(self) -> None:
+        if self.alpha == 0 and self.angles != 1:
+            raise ConfigError(f"{self}: at alpha=0 all {self.angles} blocks would be equal; set angles=1")
+
+    def _spectrum(self, operators: Operators, theta: float) -> Spectrum:
+        if self.alpha == 0:
+            return operators.lbo(self.k)
+        return operators.albo(self.alpha, theta, self.k, frame=self.frame, sweeps=self.sweeps, smoothing=self.smoothing)
