@@ -17,7 +17,7 @@ from scipy import sparse
 from csm._types import ComplexArray, FloatArray
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
-from csm.operators._edges import dot, interior_edges, longest_edge_basis, unit
+from csm.operators._edges import FaceBasis, dot, interior_edges, longest_edge_basis, unit
 from csm.operators.linefield import smooth_line_field
 
 FrameKind: TypeAlias = Literal["line_field", "smooth", "released"]
@@ -88,7 +88,7 @@ def face_frames(mesh: Mesh, *, frame: FrameKind = "line_field", sweeps: int = 3,
     if sweeps < 0:
         raise ConfigError(f"sweeps is {sweeps}, wanted 0 or more")
     if frame == "smooth":
-        return _from_angles(mesh, smooth_line_field(mesh, smoothing))
+        return _from_angles(longest_edge_basis(mesh), smooth_line_field(mesh, smoothing))
     tensors = smooth(mesh, edge_tensors(mesh), sweeps)
     return _line_field(mesh, tensors) if frame == "line_field" else _released(mesh, tensors)
 
@@ -132,12 +132,12 @@ def _line_field(mesh: Mesh, tensors: FloatArray) -> FaceFrames:
     total = np.zeros(mesh.n_faces, dtype=np.complex128)
     for corner in range(3):
         total += _greatest_curvature_line(tensors[mesh.faces[:, corner]], basis.e1, basis.e2)
-    return _from_angles(mesh, total / 3)
+    return _from_angles(basis, total / 3)
 
 
-def _from_angles(mesh: Mesh, line: ComplexArray) -> FaceFrames:
-    """Return the frames whose v has half the argument of `line`, (M,), in the longest-edge basis."""
-    basis, coherence = longest_edge_basis(mesh), np.abs(line)
+def _from_angles(basis: FaceBasis, line: ComplexArray) -> FaceFrames:
+    """Return the frames whose v has half the argument of `line`, (M,), in the basis of every face."""
+    coherence = np.abs(line)
     undecided = (coherence < _UMBILIC) | (np.abs(basis.e2).max(axis=1) == 0)
     half = 0.5 * np.angle(np.where(undecided, 1.0, line))
     cos, sin = np.cos(half)[:, None], np.sin(half)[:, None]

@@ -56,9 +56,8 @@ def smooth_line_field(mesh: Mesh, smoothing: float) -> ComplexArray:
     """
     if not smoothing >= 0:
         raise ConfigError(f"smoothing is {smoothing}, wanted a length of 0 or more, in units of sqrt(area)")
-    area = np.linalg.norm(mesh.face_crosses, axis=1) / 2
-    total = area.sum()
-    area = np.maximum(area, _LEAST_AREA * total / mesh.n_faces)
+    total = mesh.area
+    area = np.maximum(mesh.face_areas, _LEAST_AREA * total / mesh.n_faces)
     edges = interior_edges(mesh)
     left, right = _edge_lines(mesh, edges)
     measure = np.zeros(mesh.n_faces, dtype=np.complex128)
