@@ -74,13 +74,21 @@ class HumansSet:
         original, flip = humans.mesh(name), humans.mirror().indices
         if self.variant == "original":
             return Shape(original, PointMap.identity(original.n_vertices, name=name), humans.mirror())
-        params = {"variant": self.variant, "n_vertices": self.n_vertices, "seed": self.seed}
-        made = Store(self.store_root).fetch("remesh", original, params, lambda: self._remesh(original))
+        made = remeshed(original, self.variant, self.n_vertices, self.seed, Store(self.store_root))
         mesh = Mesh(made["vertices"], made["faces"], name)
         truth = PointMap(made["truth"], Direction.TEMPLATE_TO_SHAPE, mesh.n_vertices, name)
         mirror = PointMap(made["truth"][flip], Direction.TEMPLATE_TO_SHAPE, mesh.n_vertices, f"{name}, mirrored")
         return Shape(mesh, truth, mirror)
 
-    def _remesh(self, original: Mesh) -> Arrays:
-        made = (refine if self.variant == "refined" else remesh)(original, self.n_vertices, self.seed)
+
+def remeshed(original: Mesh, variant: str, n_vertices: int, seed: int, store: Store) -> Arrays:
+    """Return vertices, faces and truth (the vertex of every original one) of a "refined" or "remeshed" mesh.
+
+    It is made once and kept in the store.
+    """
+
+    def make() -> Arrays:
+        made = (refine if variant == "refined" else remesh)(original, n_vertices, seed)
         return {"vertices": made.mesh.vertices, "faces": made.mesh.faces, "truth": made.truth.indices}
+
+    return store.fetch("remesh", original, {"variant": variant, "n_vertices": n_vertices, "seed": seed}, make)

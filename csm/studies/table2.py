@@ -16,12 +16,11 @@ from matplotlib.figure import Figure
 
 from csm._progress import progress_bar
 from csm.data.datasets import find_set
-from csm.data.humansset import HumansSet
+from csm.data.humansset import HumansSet, remeshed
 from csm.data.store import Store
 from csm.descriptors.presets import preset
 from csm.errors import ConfigError, DataError
 from csm.mesh.io import atomic_path
-from csm.mesh.remesh import refine, remesh
 from csm.mesh.shape import Mesh
 from csm.studies.bodies import RIVALS
 from csm.studies.published import SECONDS_AT_6890, family
@@ -108,13 +107,7 @@ def timed_mesh(root: Path, store: Store, size: int, seed: int = 0) -> tuple[Mesh
         humans = HumansSet()
         original, whence = humans.load(humans.names[0]).mesh, f"built-in human {humans.names[0]}"
     variant = "refined" if size > original.n_vertices else "remeshed"
-    params = {"variant": variant, "n_vertices": size, "seed": seed}
-
-    def make() -> dict[str, Any]:
-        made = (refine if variant == "refined" else remesh)(original, size, seed)
-        return {"vertices": made.mesh.vertices, "faces": made.mesh.faces, "truth": made.truth.indices}
-
-    arrays = store.fetch("remesh", original, params, make)
+    arrays = remeshed(original, variant, size, seed, store)
     return Mesh(arrays["vertices"], arrays["faces"], original.name), f"{whence}, {variant}"
 
 
