@@ -11,13 +11,12 @@ from typing import Literal, TypeAlias
 from csm._types import Float32Array
 from csm.data.datasets import find_set
 from csm.data.humansset import HumansSet
-from csm.data.prepare import compute_features
 from csm.data.shapeset import Shape, ShapeSet
 from csm.data.store import Store
 from csm.descriptors.presets import preset
 from csm.errors import ConfigError, DataError
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Operators
+from csm.studies import features
 from csm.studies.study import Context
 from csm.viewer.camera import Axis
 
@@ -156,13 +155,8 @@ def landmark_vertices(bodies: Bodies, shape: Shape) -> dict[str, int]:
 
 
 def describe(mesh: Mesh, names: Sequence[str], store: Store) -> dict[str, Float32Array]:
-    """Return descriptors by their names in the presets, each (N, Q), from the store or computed on shared operators."""
-    operators = Operators(mesh)
-    chosen = {name: preset(name) for name in names}
-    # Those with the most eigenpairs come first, as these serve the others.
-    order = sorted(names, key=lambda name: chosen[name].parameters().get("k", 0), reverse=True)
-    values = {name: compute_features(mesh, chosen[name], store, operators) for name in order}
-    return {name: values[name] for name in names}
+    """Return descriptors by their names in the presets, each (N, Q), as `csm.studies.features.describe` does."""
+    return dict(zip(names, features.describe(mesh, [preset(name) for name in names], store), strict=True))
 
 
 def label(name: str) -> str:

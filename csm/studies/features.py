@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from csm._types import Float32Array
 from csm.data.prepare import compute_features
 from csm.data.shapeset import ShapeSet
 from csm.data.store import Store
 from csm.descriptors.base import Descriptor
 from csm.errors import CsmError
+from csm.mesh.shape import Mesh
 from csm.operators.bundle import Operators
 from csm.studies.pool import run_all
 
@@ -40,17 +42,22 @@ def fill(
     workers
         Processes of one thread.
     """
-    tasks = [_Task(shapes, name, tuple(sorted(descriptors, key=_pairs, reverse=True)), store) for name in names]
+    tasks = [_Task(shapes, name, tuple(descriptors), store) for name in names]
     reasons = run_all(_fill, tasks, lambda task: task.name, workers, what=f"describe {shapes.name}", unit="shape")
     return {name: why for name, why in zip(names, reasons, strict=True) if why}
 
 
+def describe(mesh: Mesh, descriptors: Sequence[Descriptor], store: Store) -> list[Float32Array]:
+    """Return descriptors of a mesh, each (N, Q), from the store or computed on shared operators and kept."""
+    operators = Operators(mesh)
+    order = sorted(range(len(descriptors)), key=lambda at: _pairs(descriptors[at]), reverse=True)
+    values = {at: compute_features(mesh, descriptors[at], store, operators) for at in order}
+    return [values[at] for at in range(len(descriptors))]
+
+
 def _fill(task: _Task) -> str:
     try:
-        mesh = task.shapes.load(task.name).mesh
-        operators = Operators(mesh)
-        for descriptor in task.descriptors:
-            compute_features(mesh, descriptor, task.store, operators)
+        describe(task.shapes.load(task.name).mesh, task.descriptors, task.store)
     except CsmError as error:
         return str(error)
     return ""

@@ -11,7 +11,7 @@ from csm.data.shapeset import Shape
 from csm.errors import ConfigError
 from csm.operators.geodesic import geodesics
 from csm.studies.bodies import RIVALS, Bodies, Source, describe, find_bodies, label, landmark_vertices
-from csm.studies.figure5 import distances_from, normalised
+from csm.studies.figure5 import TOP, distances_from, normalised
 from csm.studies.study import Context, Findings
 from csm.viewer.camera import View
 from csm.viewer.figures import save_figure
@@ -60,7 +60,7 @@ def run(
     for name in descriptors:
         query = described[_QUERY][name][true[_QUERY]]
         raw = [distances_from(query, values[name]) for values in described.values()]
-        unit = float(np.percentile(raw[0], 99))
+        unit = float(np.percentile(raw[0], TOP))
         distances = dict(zip(shapes, normalised(raw, unit), strict=True))
         grid[label(name)] = [Panel(shapes[t].mesh, d, true[t]) for t, d in distances.items()]
         rows += [
