@@ -18,6 +18,7 @@ from csm.commands.app import command, make_datamodule, output_folder
 from csm.commands.report import conclude
 from csm.commands.testing import numbers, test_all
 from csm.data.datamodule import CorrespondenceDataModule
+from csm.descriptors.base import record
 from csm.errors import ConfigError
 from csm.evaluation.provenance import provenance
 from csm.learning.callbacks import EpochLines, ValidationErrors
@@ -76,7 +77,7 @@ def make_module(cfg: DictConfig, datamodule: CorrespondenceDataModule) -> CSMMod
         network=network,
         in_channels=datamodule.n_features,
         n_classes=datamodule.n_classes,
-        descriptor={"name": descriptor.name, **descriptor.parameters()},
+        descriptor=record(descriptor),
         basis_k=datamodule.recipe.basis_k,
         **cfg.optimizer,
         training={

@@ -9,7 +9,6 @@ import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -18,7 +17,7 @@ from csm._progress import progress_bar
 from csm._types import Float32Array
 from csm.data.shapeset import Shape, ShapeSet
 from csm.data.store import Store
-from csm.descriptors.base import Descriptor
+from csm.descriptors.base import Descriptor, record
 from csm.errors import CsmError
 from csm.mesh.check import require_usable
 from csm.mesh.shape import Mesh
@@ -93,12 +92,8 @@ def compute_features(
         require_usable(mesh)
         return {"values": descriptor(operators or mesh).values.astype(np.float32)}
 
-    values: Float32Array = store.fetch("descriptor", mesh, _parameters(descriptor), make)["values"]
+    values: Float32Array = store.fetch("descriptor", mesh, record(descriptor), make)["values"]
     return values
-
-
-def _parameters(descriptor: Descriptor) -> dict[str, Any]:
-    return {"name": descriptor.name, **descriptor.parameters()}
 
 
 def prepare_shape(shape: Shape, recipe: Recipe, store: Store) -> Prepared:
@@ -109,7 +104,7 @@ def prepare_shape(shape: Shape, recipe: Recipe, store: Store) -> Prepared:
 
 def is_prepared(mesh: Mesh, recipe: Recipe, store: Store) -> bool:
     """Tell whether `prepare_shape` would find everything in the store; nothing is read."""
-    return store.has("descriptor", mesh, _parameters(recipe.descriptor)) and store.has(
+    return store.has("descriptor", mesh, record(recipe.descriptor)) and store.has(
         "lbo", mesh.unit_area(), {"k": recipe.basis_k}
     )
 

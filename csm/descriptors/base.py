@@ -41,6 +41,11 @@ class Descriptor(Protocol):
         ...
 
 
+def record(descriptor: Descriptor) -> dict[str, Any]:
+    """Return family and parameters as plain data, which `csm.descriptors.from_parameters` takes back."""
+    return {"name": descriptor.name, **descriptor.parameters()}
+
+
 def as_operators(shape: Mesh | Operators) -> Operators:
     """Return `shape` itself if it is `Operators`, else the operators of the mesh at unit area."""
     return Operators(shape) if isinstance(shape, Mesh) else shape

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from csm.descriptors.base import Descriptor, Features, as_operators
+from csm.descriptors.base import Descriptor, Features, as_operators, record
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.operators.bundle import Operators
@@ -55,4 +55,4 @@ class Stack:
 
     def parameters(self) -> dict[str, Any]:
         """Return the family and every parameter of every part as plain data."""
-        return {"parts": {name: {"name": part.name, **part.parameters()} for name, part in self.parts.items()}}
+        return {"parts": {name: record(part) for name, part in self.parts.items()}}

@@ -16,7 +16,7 @@ import numpy as np
 from csm._types import FloatArray
 from csm.data.folderset import FolderSet
 from csm.data.store import Store
-from csm.descriptors.base import Descriptor
+from csm.descriptors.base import Descriptor, record
 from csm.errors import DataError
 from csm.evaluation.protocol import Pair
 from csm.evaluation.provenance import Provenance, provenance
@@ -124,7 +124,7 @@ def _make(
 def _question(shapes: FolderSet, pairs: Sequence[Pair], descriptor: Descriptor, rules: Rules) -> dict[str, Any]:
     question = {
         "set": shapes.name,
-        "descriptor": {"name": descriptor.name, **descriptor.parameters()},
+        "descriptor": record(descriptor),
         "protocol": rules.protocol.describe(len(pairs)),
         "exact_points": rules.exact_points,
         "pairs": [list(pair) for pair in pairs],

@@ -13,7 +13,7 @@ from csm._types import Arrays
 from csm.data.prepare import compute_features
 from csm.data.shapeset import Shape, ShapeSet
 from csm.data.store import Store, read_entry
-from csm.descriptors.base import Descriptor
+from csm.descriptors.base import Descriptor, record
 from csm.errors import CsmError
 from csm.evaluation.distances import Lengths, MatchedPoints, PointErrors
 from csm.evaluation.matching import nearest
@@ -131,7 +131,7 @@ def _key(task: _Task, target: Shape, sources: Sequence[Shape], descriptor: Descr
         maps.update(shape.mesh.digest.encode())
         maps.update(np.ascontiguousarray(shape.truth.as_template_to_shape().indices, dtype="<i8").tobytes())
     return {
-        "descriptor": {"name": descriptor.name, **descriptor.parameters()},
+        "descriptor": record(descriptor),
         "shapes and maps": maps.hexdigest(),
         "exact_points": task.rules.exact_points,
         "seed": task.rules.protocol.seed,

@@ -18,6 +18,7 @@ from csm._progress import progress_bar
 from csm.data.datasets import find_set
 from csm.data.humansset import HumansSet, remeshed
 from csm.data.store import Store
+from csm.descriptors.base import record
 from csm.descriptors.presets import preset
 from csm.errors import ConfigError, DataError
 from csm.mesh.io import atomic_path
@@ -70,7 +71,7 @@ def run(
     """
     if not (sizes and descriptors and threads) or min([*sizes, *threads, repeats]) < 1:
         raise ConfigError(f"table2: sizes {sizes}, threads {threads}, repeats {repeats}; wanted numbers from 1")
-    chosen = {name: {"name": preset(name).name, **preset(name).parameters()} for name in descriptors}
+    chosen = {name: record(preset(name)) for name in descriptors}
     meshes = {size: timed_mesh(context.root, context.store, size, context.seed) for size in sorted(sizes)}
     times: dict[tuple[str, int, int], Timed] = {}
     with progress_bar(total=len(chosen) * len(sizes) * len(threads), desc="time", unit="cell") as bar:
