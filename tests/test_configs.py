@@ -19,7 +19,9 @@ from csm.commands.testing import protocol_of
 from csm.data.splits import read_split
 from csm.descriptors import PRESETS
 from csm.learning.module import CSMModule
-from csm.networks import Basis, build
+from csm.networks import build, stencils_of
+from tests.shapes import blob
+from tests.surfaces import surface_of
 
 CONF = config_folder()
 FILLED_IN_BY_COMMANDS = {"self", "descriptor", "store", "workers", "options", "train_set", "test_sets"}
@@ -83,7 +85,7 @@ def test_every_command_has_a_configuration_that_composes(command):
 def test_an_experiment_makes_its_descriptor_network_and_protocol(name):
     cfg = compose("train", [f"experiment={name}"])
     module_of(cfg)
-    assert cfg.model.ks <= cfg.data.basis_k
+    assert cfg.model.get("ks", 0) <= cfg.data.basis_k
     assert protocol_of(cfg.metric).distance == "exact", "numbers to be reported use exact geodesics"
     assert cfg.trainer.max_epochs > 0
 
@@ -105,10 +107,10 @@ def test_a_descriptor_file_is_the_preset_of_that_name(name):
 
 @pytest.mark.parametrize("name", names("model"))
 def test_a_model_file_makes_a_network_that_runs(name):
-    network = build(**plain(compose("train", [f"model={name}"]).model), in_channels=5, n_classes=9)
-    k = 128
-    basis = Basis(torch.linspace(0, 1, k), torch.randn(11, k), torch.full((11,), 1 / 11))
-    assert network(torch.randn(11, 5), basis).shape == (11, 9)
+    options = plain(compose("train", [f"model={name}"]).model)
+    network = build(**options, in_channels=5, n_classes=9).double()
+    surface = surface_of(blob(2), 128, stencils_of(**options))
+    assert network(torch.randn(162, 5).double(), surface).shape == (162, 9)
 
 
 @pytest.mark.parametrize("name", names("data"))

@@ -7,7 +7,7 @@ import json
 import logging
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +19,10 @@ from omegaconf import DictConfig, OmegaConf
 
 from csm.data.datamodule import CorrespondenceDataModule
 from csm.data.store import Store
-from csm.errors import CsmError
+from csm.errors import ConfigError, CsmError
 from csm.mesh.io import atomic_path
+from csm.networks import stencils_of
+from csm.operators.stencils import Stencil, stencil
 
 Run = Callable[[DictConfig], dict[str, Any]]
 
@@ -95,8 +97,20 @@ def _own_error(error: Exception) -> Exception:
 
 
 def make_datamodule(cfg: DictConfig) -> CorrespondenceDataModule:
-    """Make the data module of the data group, with the descriptor of its group and the store."""
+    """Make the data module of the data group, with the descriptor of its group, the model's stencils and the store."""
+    network: dict[str, Any] = OmegaConf.to_container(cfg.model, resolve=True)  # type: ignore[assignment]
     datamodule: CorrespondenceDataModule = instantiate(cfg.data, _partial_=True)(
-        descriptor=instantiate(cfg.descriptor), store=Store(cfg.store), workers=cfg.workers
+        descriptor=instantiate(cfg.descriptor),
+        stencils=stencils_for(network),
+        store=Store(cfg.store),
+        workers=cfg.workers,
     )
     return datamodule
+
+
+def stencils_for(network: Mapping[str, Any]) -> tuple[Stencil, ...]:
+    """Make the stencils that a network, given as its name and options, wants of every shape."""
+    try:
+        return tuple(stencil(name, **parameters) for name, parameters in stencils_of(**network).items())
+    except ValueError as error:
+        raise ConfigError(str(error)) from error

@@ -8,7 +8,7 @@ from typing import Any
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
-from csm.commands.app import command, output_folder
+from csm.commands.app import command, output_folder, stencils_for
 from csm.commands.report import conclude
 from csm.commands.testing import numbers, test_all
 from csm.data.datamodule import CorrespondenceDataModule
@@ -35,6 +35,7 @@ def datamodule_of(cfg: DictConfig, module: CSMModule) -> CorrespondenceDataModul
     datamodule: CorrespondenceDataModule = instantiate(cfg.data, _partial_=True)(
         descriptor=from_parameters(**module.hparams["descriptor"]),
         basis_k=module.hparams["basis_k"],
+        stencils=stencils_for(module.hparams["network"]),
         store=Store(cfg.store),
         workers=cfg.workers,
     )

@@ -11,7 +11,7 @@ import torch
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
-from csm.commands.app import command, write_json
+from csm.commands.app import command, stencils_for, write_json
 from csm.data.datamodule import to_sample
 from csm.data.prepare import Recipe, compute_features, prepare_shape
 from csm.data.shapeset import Shape
@@ -76,7 +76,8 @@ def _describe(mesh: Mesh, descriptor: Descriptor, module: CSMModule | None, stor
     if module is None:
         return torch.as_tensor(compute_features(mesh, descriptor, store))
     shape = Shape(mesh, PointMap.identity(mesh.n_vertices))
-    return module.describe(to_sample(prepare_shape(shape, Recipe(descriptor, module.hparams["basis_k"]), store)))
+    recipe = Recipe(descriptor, module.hparams["basis_k"], stencils_for(module.hparams["network"]))
+    return module.describe(to_sample(prepare_shape(shape, recipe, store)))
 
 
 def write_match(matched: Matched, folder: Path, seconds: float) -> None:

@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 from torch.utils.data import DataLoader
 
+from csm._types import Arrays
 from csm.data.prepare import Job, Prepared, Recipe, prepare, prepare_shape
 from csm.data.shapeset import Shape, ShapeSet
 from csm.data.splits import Split, read_split
@@ -19,18 +20,20 @@ from csm.data.store import Store
 from csm.descriptors.base import Descriptor
 from csm.errors import DataError
 from csm.networks.basis import Basis
+from csm.networks.surface import Surface
+from csm.operators.stencils import Stencil
 
 
 class ShapeSample(NamedTuple):
     """One shape as a network sees it.
 
-    Shapes: `features` (N, P); `basis` of K eigenpairs; `rows` (R,) vertices with a known template point and `classes`
-    (R,) that point.
+    Shapes: `features` (N, P); `surface` with K eigenpairs; `rows` (R,) vertices with a known template point and
+    `classes` (R,) that point.
     """
 
     name: str
     features: Tensor
-    basis: Basis
+    surface: Surface
     rows: Tensor
     classes: Tensor
 
@@ -51,10 +54,16 @@ def to_sample(prepared: Prepared) -> ShapeSample:
     return ShapeSample(
         prepared.shape.name,
         torch.as_tensor(prepared.features),
-        basis,
+        Surface(basis, {name: _tensors(arrays) for name, arrays in prepared.stencils.items()}),
         torch.as_tensor(truth[classes]),
         torch.as_tensor(classes),
     )
+
+
+def _tensors(arrays: Arrays) -> dict[str, Tensor]:
+    """Convert to float32 and int64."""
+    kinds = {"f": torch.float32, "i": torch.int64}
+    return {key: torch.as_tensor(value).to(kinds[value.dtype.kind]) for key, value in arrays.items()}
 
 
 class CorrespondenceDataModule(L.LightningDataModule):
@@ -80,6 +89,8 @@ class CorrespondenceDataModule(L.LightningDataModule):
         Where features and bases are kept.
     workers
         Processes for the preparation and for the distances of tests, see `csm.data.prepare.processes`.
+    stencils
+        What else the network wants to know of a shape, see `csm.operators.stencils`.
     """
 
     def __init__(
@@ -92,12 +103,13 @@ class CorrespondenceDataModule(L.LightningDataModule):
         holdout: int = 0,
         store: Store | None = None,
         workers: int | None = None,
+        stencils: Sequence[Stencil] = (),
     ) -> None:
         super().__init__()
         self.train_set = train_set
         self.test_sets: Mapping[str, ShapeSet] = {s.name: s for s in test_sets}
         self.split = split if isinstance(split, Split) else read_split(split)
-        self.recipe = Recipe(descriptor, basis_k)
+        self.recipe = Recipe(descriptor, basis_k, tuple(stencils))
         self.store = store or Store()
         self.workers = workers
         self.holdout = holdout

@@ -6,7 +6,7 @@ import logging
 import multiprocessing
 import os
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass, field
 
@@ -14,7 +14,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from csm._progress import progress_bar
-from csm._types import Float32Array
+from csm._types import Arrays, Float32Array
 from csm.data.shapeset import Shape, ShapeSet
 from csm.data.store import Store
 from csm.descriptors.base import Descriptor, record
@@ -23,6 +23,7 @@ from csm.mesh.check import require_usable
 from csm.mesh.shape import Mesh
 from csm.operators.bundle import Operators
 from csm.operators.spectrum import Spectrum
+from csm.operators.stencils import Stencil
 
 _log = logging.getLogger(__name__)
 
@@ -37,19 +38,23 @@ class Recipe:
         Gives the input features.
     basis_k
         How many Laplace-Beltrami eigenpairs are kept.
+    stencils
+        What else it wants to know.
     """
 
     descriptor: Descriptor
     basis_k: int = 128
+    stencils: tuple[Stencil, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A shape with its features, shape (N, Q), and the eigenbasis of its unit-area copy."""
+    """A shape with its features, shape (N, Q), and of its unit-area copy the eigenbasis and the stencils by name."""
 
     shape: Shape
     features: Float32Array
     basis: Spectrum
+    stencils: Mapping[str, Arrays] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -99,13 +104,22 @@ def compute_features(
 def prepare_shape(shape: Shape, recipe: Recipe, store: Store) -> Prepared:
     """Return one shape with features and basis, from the store where they are there."""
     features = compute_features(shape.mesh, recipe.descriptor, store)
-    return Prepared(shape, features, Operators(shape.mesh, memo=store).lbo(recipe.basis_k))
+    operators = Operators(shape.mesh, memo=store)
+    stencils = {s.name: _arrays_of(s, operators, store) for s in recipe.stencils}
+    return Prepared(shape, features, operators.lbo(recipe.basis_k), stencils)
+
+
+def _arrays_of(stencil: Stencil, operators: Operators, store: Store) -> Arrays:
+    return store.fetch(f"stencil-{stencil.name}", operators.mesh, stencil.parameters(), lambda: stencil(operators))
 
 
 def is_prepared(mesh: Mesh, recipe: Recipe, store: Store) -> bool:
     """Tell whether `prepare_shape` would find everything in the store; nothing is read."""
-    return store.has("descriptor", mesh, record(recipe.descriptor)) and store.has(
-        "lbo", mesh.unit_area(), {"k": recipe.basis_k}
+    unit = mesh.unit_area()
+    return (
+        store.has("descriptor", mesh, record(recipe.descriptor))
+        and store.has("lbo", unit, {"k": recipe.basis_k})
+        and all(store.has(f"stencil-{s.name}", unit, s.parameters()) for s in recipe.stencils)
     )
 
 

@@ -13,7 +13,7 @@ from torch.optim.lr_scheduler import CosineAnnealingLR, LRScheduler, OneCycleLR,
 from csm.data.datamodule import ShapeSample
 from csm.errors import ConfigError
 from csm.learning.loss import Products, linear_cross_entropy
-from csm.networks import Basis, CorrespondenceNetwork, build
+from csm.networks import CorrespondenceNetwork, Surface, build
 
 Schedule = Literal["constant", "cosine", "step", "one_cycle"]
 
@@ -93,9 +93,9 @@ class CSMModule(L.LightningModule):
     def _net(self) -> CorrespondenceNetwork:
         return cast(CorrespondenceNetwork, self.network)
 
-    def forward(self, features: Tensor, basis: Basis) -> Tensor:
+    def forward(self, features: Tensor, surface: Surface) -> Tensor:
         """Return the learned descriptor, shape (N, Q)."""
-        return self._net.describe(features, basis)
+        return self._net.describe(features, surface)
 
     def loss(self, descriptor: Tensor, sample: ShapeSample) -> Tensor:
         """Cross-entropy of the classifier over the rows with a known template point (in training, a draw of them)."""
@@ -109,13 +109,13 @@ class CSMModule(L.LightningModule):
 
     def training_step(self, sample: ShapeSample) -> Tensor:
         """One shape: loss of its labelled vertices."""
-        loss = self.loss(self(sample.features, sample.basis), sample)
+        loss = self.loss(self(sample.features, sample.surface), sample)
         self.log("train/loss", loss, on_step=False, on_epoch=True, prog_bar=True, batch_size=1)
         return loss
 
     def validation_step(self, sample: ShapeSample) -> Tensor:
         """Return the learned descriptor of one shape; the loss is logged, the errors are a callback's business."""
-        descriptor: Tensor = self(sample.features, sample.basis)
+        descriptor: Tensor = self(sample.features, sample.surface)
         self.log("val/loss", self.loss(descriptor, sample), prog_bar=True, batch_size=1)
         return descriptor
 
@@ -123,8 +123,7 @@ class CSMModule(L.LightningModule):
     def describe(self, sample: ShapeSample) -> Tensor:
         """Return the learned descriptor of a shape in evaluation mode, shape (N, Q), on the CPU."""
         self.eval()
-        basis = Basis(*(t.to(self.device) for t in sample.basis))
-        descriptor: Tensor = self(sample.features.to(self.device), basis)
+        descriptor: Tensor = self(sample.features.to(self.device), sample.surface.to(self.device))
         return descriptor.cpu()
 
     def configure_optimizers(self) -> Any:

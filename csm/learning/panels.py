@@ -70,7 +70,7 @@ class TensorBoardPanels(L.Callback):
         filters = getattr(module.network, "filters", None)
         if filters is None:
             return
-        evals = source.sample.basis.evals.to(module.device)
+        evals = source.sample.surface.basis.evals.to(module.device)
         with torch.no_grad():
             responses = {name: response.cpu().numpy() for name, response in filters(evals).items()}
         k = len(next(iter(responses.values())))

@@ -1,7 +1,8 @@
 """Networks that turn input descriptors into learned ones; plain PyTorch.
 
-Every network has ``describe(x, basis) -> (N, Q)``, a linear ``classifier`` over the template vertices, a ``dropout``
-between the two, and ``forward(x, basis) -> (N, n_classes)``.
+Every network has ``describe(x, surface) -> (N, Q)``, a linear ``classifier`` over the template vertices, a ``dropout``
+between the two, and ``forward(x, surface) -> (N, n_classes)``.  One that needs more of a shape than its eigenbasis has
+a static ``stencils(**options)`` that names the stencils of `csm.operators.stencils` and their parameters.
 """
 
 from __future__ import annotations
@@ -13,8 +14,9 @@ from torch import Tensor, nn
 from csm.networks.basis import Basis
 from csm.networks.csmcnn import CSMCNN
 from csm.networks.csmconv import CSMConv
+from csm.networks.surface import Surface
 
-__all__ = ["CSMCNN", "NETWORKS", "Basis", "CSMConv", "CorrespondenceNetwork", "build"]
+__all__ = ["CSMCNN", "NETWORKS", "Basis", "CSMConv", "CorrespondenceNetwork", "Surface", "build", "stencils_of"]
 
 
 class CorrespondenceNetwork(Protocol):
@@ -23,7 +25,7 @@ class CorrespondenceNetwork(Protocol):
     classifier: nn.Linear
     dropout: nn.Dropout
 
-    def describe(self, x: Tensor, basis: Basis) -> Tensor:
+    def describe(self, x: Tensor, surface: Surface) -> Tensor:
         """Return the learned descriptor, shape (N, Q)."""
         ...
 
@@ -39,9 +41,31 @@ def build(name: str, in_channels: int, n_classes: int, **options: Any) -> nn.Mod
     ValueError
         If the name or an option is unknown, with the names that are known.
     """
-    if name not in NETWORKS:
-        raise ValueError(f"there is no network {name!r}; known are {', '.join(sorted(NETWORKS))}")
     try:
-        return NETWORKS[name](in_channels, n_classes, **options)
+        return _known(name)(in_channels, n_classes, **options)
     except TypeError as error:
         raise ValueError(f"network {name}: {error}") from error
+
+
+def stencils_of(name: str, **options: Any) -> dict[str, dict[str, Any]]:
+    """Return the stencils that a network with these options wants, name -> parameters; none for most.
+
+    Raises
+    ------
+    ValueError
+        If the name is unknown, with the names that are known.
+
+    Examples
+    --------
+    >>> stencils_of("csmcnn", ks=64)
+    {}
+    """
+    ask = getattr(_known(name), "stencils", None)
+    wanted: dict[str, dict[str, Any]] = {} if ask is None else ask(**options)
+    return wanted
+
+
+def _known(name: str) -> type[nn.Module]:
+    if name not in NETWORKS:
+        raise ValueError(f"there is no network {name!r}; known are {', '.join(sorted(NETWORKS))}")
+    return NETWORKS[name]

@@ -9,8 +9,8 @@ from typing import Literal
 import torch
 from torch import Tensor, nn
 
-from csm.networks.basis import Basis
 from csm.networks.csmconv import BiasDomain, CSMConv
+from csm.networks.surface import Surface
 
 Normalisation = Literal["batch", "instance", "none"]
 Activation = Literal["relu", "elu", "leaky_relu", "gelu"]
@@ -93,9 +93,9 @@ class CSMCNN(nn.Module):
         self.dropout = nn.Dropout(dropout)
         self.classifier = nn.Linear(descriptor_channels, n_classes)
 
-    def describe(self, x: Tensor, basis: Basis) -> Tensor:
+    def describe(self, x: Tensor, surface: Surface) -> Tensor:
         """Return the learned descriptor, shape (N, descriptor_channels), of input features `x`, shape (N, P)."""
-        basis = basis.first(self.ks)
+        basis = surface.basis.first(self.ks)
         x = self.finish[0](self.lift(x))
         for conv, finish in zip(self.convs, self.finish[1:-1], strict=True):
             x = finish(conv(x, basis))
@@ -106,9 +106,9 @@ class CSMCNN(nn.Module):
         """Return the learned filters of each convolution at the eigenvalues, name -> (K_s, C_in, C_out)."""
         return {f"conv{i}": conv.filters(evals[: self.ks]) for i, conv in enumerate(self.convs, 1)}  # type: ignore[operator]
 
-    def forward(self, x: Tensor, basis: Basis) -> Tensor:
+    def forward(self, x: Tensor, surface: Surface) -> Tensor:
         """Return the logits over the template vertices, shape (N, n_classes)."""
-        y: Tensor = self.classifier(self.dropout(self.describe(x, basis)))
+        y: Tensor = self.classifier(self.dropout(self.describe(x, surface)))
         return y
 
 

@@ -32,15 +32,15 @@ def test_a_batch_is_one_shape_with_its_tensors(toys):
     assert sorted(b.name for b in batches) == list(toys.fit_names)
     sample = batches[0]
     assert sample.features.shape == (162, 16)
-    assert sample.basis.evecs.shape == (162, 24)
-    assert sample.features.dtype == sample.basis.evecs.dtype == torch.float32
+    assert sample.surface.basis.evecs.shape == (162, 24)
+    assert sample.features.dtype == sample.surface.basis.evecs.dtype == torch.float32
     torch.testing.assert_close(sample.rows, torch.arange(162))
     torch.testing.assert_close(sample.classes, torch.arange(162))
     assert (toys.n_features, toys.n_classes) == (16, 162)
 
 
 def test_the_basis_is_orthonormal_on_the_unit_area_shape(toys):
-    basis = next(iter(toys.train_dataloader())).basis
+    basis = next(iter(toys.train_dataloader())).surface.basis
     gram = basis.evecs.T @ (basis.mass[:, None] * basis.evecs)
     torch.testing.assert_close(gram, torch.eye(24), atol=1e-4, rtol=0)
     assert basis.mass.sum().item() == pytest.approx(1.0, abs=1e-5)

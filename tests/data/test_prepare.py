@@ -1,14 +1,21 @@
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
 import numpy as np
 import pytest
+import torch
 
+from csm._types import Arrays
+from csm.data.datamodule import to_sample
 from csm.data.folder import recognise
-from csm.data.prepare import Job, Recipe, compute_features, prepare, prepare_shape
+from csm.data.prepare import Job, Recipe, compute_features, is_prepared, prepare, prepare_shape
 from csm.data.store import Store, read_entry
 from csm.descriptors import ACD
 from csm.mesh.io import write_mesh
 from csm.mesh.shape import Mesh
+from csm.operators.bundle import Operators
 from tests.toyset import write_toys
 
 RECIPE = Recipe(ACD(angles=3, k=5, order=2), 10)
@@ -98,3 +105,32 @@ def test_another_parameter_is_another_entry(toys, tmp_path):
     before = store.computed
     prepare_shape(shape, Recipe(ACD(angles=3, k=5, order=2, sweeps=2), 10), store)
     assert store.computed == before + 1
+
+
+@dataclass(frozen=True)
+class Valence:
+    """A stencil for this test: how many edges meet in a vertex, plus a parameter."""
+
+    more: int = 0
+    name: ClassVar[str] = "valence"
+
+    def __call__(self, operators: Operators) -> Arrays:
+        return {"count": np.bincount(operators.mesh.faces.ravel()) + self.more, "mass": operators.mass}
+
+    def parameters(self) -> dict[str, Any]:
+        return {"more": self.more}
+
+
+def test_stencils_are_kept_in_the_store_and_reach_the_sample(toys, tmp_path):
+    store, shape = Store(tmp_path / "store"), toys.load("toy0")
+    wanting = replace(RECIPE, stencils=(Valence(more=2),))
+    prepare_shape(shape, RECIPE, store)
+    assert is_prepared(shape.mesh, RECIPE, store)
+    assert not is_prepared(shape.mesh, wanting, store)
+    tensors = to_sample(prepare_shape(shape, wanting, store)).surface.stencil("valence")
+    assert is_prepared(shape.mesh, wanting, store)
+    assert not is_prepared(shape.mesh, replace(RECIPE, stencils=(Valence(),)), store)
+    np.testing.assert_array_equal(tensors["count"], np.bincount(shape.mesh.faces.ravel()) + 2)
+    assert tensors["count"].dtype == torch.int64
+    assert tensors["mass"].dtype == torch.float32
+    assert tensors["mass"].sum().item() == pytest.approx(1.0), "stencils are of the unit-area copy"

@@ -8,7 +8,7 @@ import torch
 from csm.errors import DataError
 from csm.learning.export import export_module, load_module
 from csm.learning.module import CSMModule
-from csm.networks import Basis
+from csm.networks import Basis, Surface
 from tests.learning.test_module import NETWORK
 
 
@@ -18,10 +18,10 @@ def module() -> CSMModule:
     return CSMModule(NETWORK, 7, 50, {"name": "hks", "k": 30, "n_times": 7, "scaled": True}, basis_k=24)
 
 
-def sample() -> tuple[torch.Tensor, Basis]:
+def sample() -> tuple[torch.Tensor, Surface]:
     g = torch.Generator().manual_seed(1)
     evecs, _ = torch.linalg.qr(torch.randn(40, 24, generator=g))
-    return torch.randn(40, 7, generator=g), Basis(torch.arange(24.0), evecs, torch.ones(40))
+    return torch.randn(40, 7, generator=g), Surface(Basis(torch.arange(24.0), evecs, torch.ones(40)))
 
 
 @pytest.mark.parametrize("classifier", [False, True])

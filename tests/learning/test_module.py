@@ -84,16 +84,16 @@ def test_the_loss_is_the_cross_entropy_of_the_labelled_rows(datamodule):
     module = make(datamodule)
     sample = next(iter(datamodule.val_dataloader()))
     module.eval()
-    logits = module.network(sample.features, sample.basis)[sample.rows]
+    logits = module.network(sample.features, sample.surface)[sample.rows]
     expected = F.cross_entropy(logits, sample.classes)
-    torch.testing.assert_close(module.loss(module(sample.features, sample.basis), sample), expected)
+    torch.testing.assert_close(module.loss(module(sample.features, sample.surface), sample), expected)
 
 
 def test_the_loss_of_drawn_rows_is_that_of_all_rows_on_average(datamodule):
     sample = next(iter(datamodule.val_dataloader()))
     module, full = make(datamodule, loss_rows=20), make(datamodule)
     with torch.no_grad():
-        x = module.eval()(sample.features, sample.basis)
+        x = module.eval()(sample.features, sample.surface)
         assert module.loss(x, sample) == full.eval().loss(x, sample)  # a test of the network takes them all
         module.train()
         draws = torch.stack([module.loss(x, sample) for _ in range(400)])

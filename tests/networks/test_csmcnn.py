@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 import torch
 
-from csm.networks import CSMCNN, build
+from csm.networks import CSMCNN, Surface, build
 from tests.networks.test_csmconv import basis_of
 from tests.shapes import blob
 
@@ -41,8 +41,8 @@ def test_every_option_runs_and_learns(basis, normalisation, activation):
     torch.manual_seed(0)
     net = CSMCNN(4, 30, (8, 8, 16), 12, ks=20, terms=3, normalisation=normalisation, activation=activation).double()
     x = torch.randn(len(basis.mass), 4, dtype=torch.float64)
-    assert net.describe(x, basis).shape == (len(basis.mass), 12)
-    net(x, basis).square().sum().backward()
+    assert net.describe(x, Surface(basis)).shape == (len(basis.mass), 12)
+    net(x, Surface(basis)).square().sum().backward()
     assert all(p.grad is not None and torch.isfinite(p.grad).all() for p in net.parameters())
 
 
@@ -51,14 +51,14 @@ def test_relabelling_the_vertices_permutes_the_descriptor(basis):
     x = torch.randn(len(basis.mass), 4, dtype=torch.float64)
     order = torch.randperm(len(basis.mass))
     moved = basis._replace(evecs=basis.evecs[order], mass=basis.mass[order])
-    torch.testing.assert_close(net.describe(x[order], moved), net.describe(x, basis)[order])
+    torch.testing.assert_close(net.describe(x[order], Surface(moved)), net.describe(x, Surface(basis))[order])
 
 
 def test_sign_flips_leave_the_network_unchanged(basis):
     net = CSMCNN(4, 30, ks=20).double().eval()
     x = torch.randn(len(basis.mass), 4, dtype=torch.float64)
     flipped = basis._replace(evecs=-basis.evecs)
-    torch.testing.assert_close(net.describe(x, flipped), net.describe(x, basis))
+    torch.testing.assert_close(net.describe(x, Surface(flipped)), net.describe(x, Surface(basis)))
 
 
 def test_instance_normalisation_gives_each_channel_mean_zero_and_variance_one(basis):
