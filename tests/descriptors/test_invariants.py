@@ -11,7 +11,7 @@ from csm.descriptors import PRESETS, Descriptor
 from tests.descriptors.invariances import CHECKS, mirrored, rigid_motion
 from tests.shapes import blob
 
-LEFT_RIGHT = ["acd", "acd_both", "acd_paper", "acd_release", "acd_release_frame", "asmwd", "awft", "shot"]
+LEFT_RIGHT = ["acd", "acd_frames", "acd_paper", "acd_release", "acd_release_frame", "asmwd", "awft", "shot"]
 
 
 def small(name: str) -> Descriptor:
