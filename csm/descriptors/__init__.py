@@ -11,6 +11,7 @@ from csm.descriptors.asmwd import ASMWD
 from csm.descriptors.awft import AWFT
 from csm.descriptors.base import Descriptor, Features
 from csm.descriptors.chebyshev import ACD
+from csm.descriptors.coordinates import Coordinates
 from csm.descriptors.dep import DEP
 from csm.descriptors.gps import GPS
 from csm.descriptors.heat import HKS
@@ -36,6 +37,7 @@ __all__ = [
     "WEDS",
     "WFT",
     "WKS",
+    "Coordinates",
     "Descriptor",
     "Features",
     "Stack",

@@ -20,7 +20,8 @@ class HKS:
 
     .. math:: h_t(x) = \sum_{k=1}^{K} e^{-\lambda_k t} \, \phi_k(x)^2
 
-    with times from 4 ln 10 / lambda_K to 4 ln 10 / lambda_2, where lambda_2 is the first eigenvalue that is not zero.
+    with times from 4 ln 10 / lambda_K to 4 ln 10 / lambda_2, where lambda_2 is the first eigenvalue that is not zero,
+    or between two given times.
 
     Parameters
     ----------
@@ -30,40 +31,56 @@ class HKS:
         Number of times, so of columns.
     scaled
         Divide each column by the heat trace, the sum of exp(-lambda_k t).
+    first, last
+        First and last time, in units of the area, the same for every shape; None for those of the shape's spectrum.
 
     Raises
     ------
     ConfigError
-        If `k` or `n_times` is below 2.
+        If `k` or `n_times` is below 2, only one of `first` and `last` is given, or they are not positive and ascending.
 
     References
     ----------
     Sun, Ovsjanikov, Guibas, "A concise and provably informative multi-scale signature based on heat diffusion",
-    SGP 2009.
+    SGP 2009.  Fixed times: Sharp et al., "DiffusionNet: discretization agnostic learning on surfaces", TOG 2022.
     """
 
     k: int = 300
     n_times: int = 100
     scaled: bool = True
+    first: float | None = None
+    last: float | None = None
 
     name: ClassVar[str] = "hks"
 
     def __post_init__(self) -> None:
         if self.k < 2 or self.n_times < 2:
             raise ConfigError(f"{self}: wanted k and n_times of at least 2")
+        if self._fixed is None and (self.first, self.last) != (None, None):
+            raise ConfigError(f"first={self.first}, last={self.last}: wanted two times with 0 < first < last, or none")
+
+    @property
+    def _fixed(self) -> tuple[float, float] | None:
+        """First and last time if they are given and make sense."""
+        if self.first is None or self.last is None or not 0 < self.first < self.last:
+            return None
+        return self.first, self.last
 
     def __call__(self, shape: Mesh | Operators) -> Features:
         """Return the descriptor of every vertex, (N, n_times), in units of 1/area."""
         spectrum = as_operators(shape).lbo(self.k)
-        times = heat_times(spectrum.evals[spectrum.n_zero()], spectrum.evals[-1], self.n_times)
+        if self._fixed:
+            times = np.geomspace(*self._fixed, self.n_times)
+        else:
+            times = heat_times(spectrum.evals[spectrum.n_zero()], spectrum.evals[-1], self.n_times)
         return Features(
             heat_kernel_signature(spectrum.evals, spectrum.evecs, times, scaled=self.scaled),
             tuple(f"t={t:.3g}" for t in times),
         )
 
     def parameters(self) -> dict[str, Any]:
-        """Return every parameter as plain data."""
-        return asdict(self)
+        """Return every parameter as plain data; times that are not given are left out."""
+        return {key: value for key, value in asdict(self).items() if value is not None}
 
 
 def heat_times(first: float, last: float, n: int) -> FloatArray:

@@ -10,6 +10,7 @@ from csm.descriptors.asmwd import ASMWD
 from csm.descriptors.awft import AWFT
 from csm.descriptors.base import Descriptor
 from csm.descriptors.chebyshev import ACD
+from csm.descriptors.coordinates import Coordinates
 from csm.descriptors.dep import DEP
 from csm.descriptors.gps import GPS
 from csm.descriptors.heat import HKS
@@ -36,6 +37,7 @@ PRESETS: dict[str, Descriptor] = {
     ),
     "acd_isotropic": ACD(alpha=0.0, angles=1),
     "hks": HKS(),
+    "hks_diffusionnet": HKS(k=128, n_times=16, scaled=False, first=0.01, last=1.0),
     "wks": WKS(),
     "wks_functional_map": WKS(variant="functional_map"),
     "shot": SHOT(),
@@ -48,6 +50,7 @@ PRESETS: dict[str, Descriptor] = {
     "awft": AWFT(),
     "asmwd": ASMWD(),
     "gps": GPS(),
+    "xyz": Coordinates(),
 }
 """Named settings; "acd_release_frame" reproduces the authors' output with their frame, world axes and all."""
 
@@ -65,7 +68,7 @@ def preset(name: str, **overrides: Any) -> Descriptor:
     Examples
     --------
     >>> preset("hks", n_times=16)
-    HKS(k=300, n_times=16, scaled=True)
+    HKS(k=300, n_times=16, scaled=True, first=None, last=None)
     """
     if name not in PRESETS:
         raise ConfigError(f"there is no descriptor {name!r}; there are {', '.join(PRESETS)}")

@@ -34,7 +34,20 @@ def test_all_points_of_a_sphere_are_alike():
     np.testing.assert_allclose(values, 1, rtol=0.05)
 
 
-@pytest.mark.parametrize("wrong", [{"k": 1}, {"n_times": 1}])
+def test_given_times_are_the_same_for_every_shape_and_in_the_record():
+    fixed = HKS(k=30, n_times=3, scaled=False, first=0.01, last=1.0)
+    operators = Operators(blob(2))
+    spectrum = operators.lbo(30)
+    expected = [spectrum.evecs**2 @ np.exp(-t * spectrum.evals) for t in (0.01, 0.1, 1.0)]
+    np.testing.assert_allclose(fixed(operators).values, np.stack(expected, axis=1), rtol=1e-10)
+    assert HKS(**fixed.parameters()) == fixed
+    assert set(HKS().parameters()) == {"k", "n_times", "scaled"}, "keys of what is in a store already stay"
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"k": 1}, {"n_times": 1}, {"first": 0.1}, {"last": 0.1}, {"first": 1.0, "last": 0.1}, {"first": 0, "last": 1}],
+)
 def test_settings_out_of_range_are_refused(wrong):
     with pytest.raises(ConfigError, match="wanted"):
         HKS(**wrong)

@@ -11,7 +11,7 @@ from csm.descriptors import PRESETS, Descriptor
 from tests.descriptors.invariances import CHECKS, mirrored, rigid_motion
 from tests.shapes import blob
 
-LEFT_RIGHT = ["acd", "acd_frames", "acd_paper", "acd_release", "acd_release_frame", "asmwd", "awft", "shot"]
+LEFT_RIGHT = ["acd", "acd_frames", "acd_paper", "acd_release", "acd_release_frame", "asmwd", "awft", "shot", "xyz"]
 
 
 def small(name: str) -> Descriptor:
@@ -23,7 +23,7 @@ def small(name: str) -> Descriptor:
 
 @pytest.mark.parametrize("check", CHECKS, ids=lambda c: c.__name__)
 @pytest.mark.parametrize(
-    "name", ["acd", "acd_paper", "acd_release", "acd_isotropic", "hks", "wks", "wks_functional_map"]
+    "name", ["acd", "acd_paper", "acd_release", "acd_isotropic", "hks", "hks_diffusionnet", "wks", "wks_functional_map"]
 )
 def test_first_descriptors_pass_the_checks_of_the_others(name, check):
     check(small(name))

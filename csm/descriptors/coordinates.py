@@ -1,0 +1,35 @@
+"""Vertex positions as a descriptor."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar
+
+from csm.descriptors.base import Features, as_operators
+from csm.mesh.shape import Mesh
+from csm.operators.bundle import Operators
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """Where a vertex is, seen from the centre of the surface: an input for networks.
+
+    Not unchanged by rotations and not a descriptor to match by: shapes must stand upright and look the same way, or
+    the network must have seen them turned.
+
+    Notes
+    -----
+    The centre is the mean over the surface, not over the vertices, so that it does not follow the sampling.
+    """
+
+    name: ClassVar[str] = "xyz"
+
+    def __call__(self, shape: Mesh | Operators) -> Features:
+        """Return x, y and z of every vertex, (N, 3), in units of the square root of the area if that is 1."""
+        operators = as_operators(shape)
+        vertices, areas = operators.mesh.vertices, operators.mass
+        return Features(vertices - areas @ vertices / areas.sum(), ("x", "y", "z"))
+
+    def parameters(self) -> dict[str, Any]:
+        """Return every parameter as plain data; there is none."""
+        return asdict(self)
