@@ -12,11 +12,26 @@ from typing import Any, Protocol
 from torch import Tensor, nn
 
 from csm.networks.basis import Basis
+from csm.networks.chebynet import ChebyNet
 from csm.networks.csmcnn import CSMCNN
 from csm.networks.csmconv import CSMConv
+from csm.networks.mlp import MLP
+from csm.networks.splinecnn import SplineCNN
 from csm.networks.surface import Surface
 
-__all__ = ["CSMCNN", "NETWORKS", "Basis", "CSMConv", "CorrespondenceNetwork", "Surface", "build", "stencils_of"]
+__all__ = [
+    "CSMCNN",
+    "MLP",
+    "NETWORKS",
+    "Basis",
+    "CSMConv",
+    "ChebyNet",
+    "CorrespondenceNetwork",
+    "SplineCNN",
+    "Surface",
+    "build",
+    "stencils_of",
+]
 
 
 class CorrespondenceNetwork(Protocol):
@@ -30,7 +45,12 @@ class CorrespondenceNetwork(Protocol):
         ...
 
 
-NETWORKS: dict[str, type[nn.Module]] = {"csmcnn": CSMCNN}
+NETWORKS: dict[str, type[nn.Module]] = {
+    "chebynet": ChebyNet,
+    "csmcnn": CSMCNN,
+    "mlp": MLP,
+    "splinecnn": SplineCNN,
+}
 
 
 def build(name: str, in_channels: int, n_classes: int, **options: Any) -> nn.Module:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from typing import Literal
+from typing import Literal, get_args
 
 import torch
 from torch import Tensor, nn
@@ -77,19 +77,13 @@ class CSMCNN(nn.Module):
         bias: BiasDomain = "spatial",
     ) -> None:
         super().__init__()
-        if activation not in ACTIVATIONS:
-            raise ValueError(f"activation is one of {', '.join(ACTIVATIONS)}, got {activation!r}")
-        if normalisation not in ("batch", "instance", "none"):
-            raise ValueError(f'normalisation is "batch", "instance" or "none", got {normalisation!r}')
-
-        def finish(width: int) -> nn.Sequential:
-            return nn.Sequential(*_normaliser(normalisation, width, momentum, eps), ACTIVATIONS[activation]())
-
         self.ks = ks
         self.lift = nn.Linear(in_channels, channels[0])
         self.convs = nn.ModuleList(CSMConv(a, b, terms, bias) for a, b in itertools.pairwise(channels))
         self.embed = nn.Linear(channels[-1], descriptor_channels)
-        self.finish = nn.ModuleList(finish(width) for width in (*channels, descriptor_channels))
+        self.finish = nn.ModuleList(
+            finishing(width, normalisation, activation, momentum, eps) for width in (*channels, descriptor_channels)
+        )
         self.dropout = nn.Dropout(dropout)
         self.classifier = nn.Linear(descriptor_channels, n_classes)
 
@@ -128,7 +122,23 @@ class VertexNorm(nn.Module):
         return y
 
 
-def _normaliser(kind: Normalisation, width: int, momentum: float, eps: float) -> list[nn.Module]:
-    if kind == "batch":
-        return [nn.BatchNorm1d(width, eps=eps, momentum=momentum)]
-    return [VertexNorm(width, eps)] if kind == "instance" else []
+def finishing(
+    width: int, normalisation: Normalisation, activation: Activation, momentum: float, eps: float
+) -> nn.Sequential:
+    """Return what comes after a layer of this width: its normalisation, if any, and its activation.
+
+    Raises
+    ------
+    ValueError
+        If the normalisation or the activation is unknown.
+    """
+    if activation not in ACTIVATIONS:
+        raise ValueError(f"activation is one of {', '.join(ACTIVATIONS)}, got {activation!r}")
+    if normalisation not in get_args(Normalisation):
+        raise ValueError(f'normalisation is "batch", "instance" or "none", got {normalisation!r}')
+    layers: list[nn.Module] = [ACTIVATIONS[activation]()]
+    if normalisation == "batch":
+        layers.insert(0, nn.BatchNorm1d(width, eps=eps, momentum=momentum))
+    elif normalisation == "instance":
+        layers.insert(0, VertexNorm(width, eps))
+    return nn.Sequential(*layers)

@@ -10,6 +10,8 @@ from typing import Any, ClassVar, Protocol
 
 from csm._types import Arrays
 from csm.operators.bundle import Operators
+from csm.operators.edgesplines import EdgeSplines
+from csm.operators.scaledlaplacian import ScaledLaplacian
 
 
 class Stencil(Protocol):
@@ -26,7 +28,10 @@ class Stencil(Protocol):
         ...
 
 
-STENCILS: dict[str, type[Stencil]] = {}
+STENCILS: dict[str, type[Stencil]] = {
+    EdgeSplines.name: EdgeSplines,
+    ScaledLaplacian.name: ScaledLaplacian,
+}
 
 
 def stencil(name: str, **parameters: Any) -> Stencil:
@@ -38,7 +43,7 @@ def stencil(name: str, **parameters: Any) -> Stencil:
         If the name or a parameter is unknown, with the names that are known.
     """
     if name not in STENCILS:
-        raise ValueError(f"there is no stencil {name!r}; known are {', '.join(sorted(STENCILS)) or 'none'}")
+        raise ValueError(f"there is no stencil {name!r}; known are {', '.join(sorted(STENCILS))}")
     try:
         return STENCILS[name](**parameters)
     except TypeError as error:

@@ -1,0 +1,124 @@
+"""ChebyNet: convolutions that are polynomials of the mesh's sparse Laplacian."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor, nn
+
+from csm.networks.sparse import chebyshev_filter
+from csm.networks.surface import Surface
+
+
+class ChebyNet(nn.Module):
+    """Six Chebyshev graph convolutions, MLP256, and a classifier over the template vertices; ELU after each.
+
+    A reference for locality: a convolution of K terms sees the K - 1 rings around a vertex, one of `CSMConv` the whole
+    shape.
+
+    Parameters
+    ----------
+    in_channels
+        Width P of the input features.
+    n_classes
+        Number of template vertices.
+    channels
+        Width of each convolution.
+    descriptor_channels
+        Width of the learned descriptor.
+    terms
+        Number K of Chebyshev polynomials per convolution, T_0 .. T_{K-1}.
+    laplacian
+        "graph" or "cotangent", see `csm.operators.scaledlaplacian.ScaledLaplacian`.
+    dropout
+        Between descriptor and classifier.
+
+    Notes
+    -----
+    The method was published for other data; widths, ELU and dropout are those of `SplineCNN`.
+
+    References
+    ----------
+    Defferrard, Bresson, Vandergheynst, "Convolutional neural networks on graphs with fast localized spectral
+    filtering", NeurIPS 2016.
+    """
+
+    def __init__(
+        self,
+        in_channels: int,
+        n_classes: int,
+        channels: Sequence[int] = (32, 64, 64, 64, 64, 64),
+        descriptor_channels: int = 256,
+        terms: int = 6,
+        laplacian: str = "graph",
+        dropout: float = 0.5,
+    ) -> None:
+        super().__init__()
+        if laplacian not in ("graph", "cotangent"):
+            raise ValueError(f'laplacian is "graph" or "cotangent", got {laplacian!r}')
+        self.convs = nn.ModuleList(ChebConv(a, b, terms) for a, b in itertools.pairwise((in_channels, *channels)))
+        self.embed = nn.Linear(channels[-1], descriptor_channels)
+        self.dropout = nn.Dropout(dropout)
+        self.classifier = nn.Linear(descriptor_channels, n_classes)
+
+    @staticmethod
+    def stencils(laplacian: str = "graph", **_: Any) -> dict[str, dict[str, Any]]:
+        """Return the stencil that the convolutions are polynomials of."""
+        return {"scaled_laplacian": {"laplacian": laplacian}}
+
+    def describe(self, x: Tensor, surface: Surface) -> Tensor:
+        """Return the learned descriptor, shape (N, descriptor_channels), of input features `x`, shape (N, P)."""
+        stencil = surface.stencil("scaled_laplacian")
+        for conv in self.convs:
+            x = F.elu(conv(x, stencil))
+        return F.elu(self.embed(x))
+
+    def forward(self, x: Tensor, surface: Surface) -> Tensor:
+        """Return the logits over the template vertices, shape (N, n_classes)."""
+        y: Tensor = self.classifier(self.dropout(self.describe(x, surface)))
+        return y
+
+
+class ChebConv(nn.Module):
+    r"""Chebyshev graph convolution  y = \sum_{k=0}^{K-1} T_k(\tilde L)\, x\, W_k + b.
+
+    Parameters
+    ----------
+    in_channels, out_channels
+        Channels C_in of the input and C_out of the output functions.
+    terms
+        K, at least 1.
+
+    Shapes
+    ------
+    input (N, C_in), output (N, C_out); weight (K, C_in, C_out), bias (C_out,).
+    """
+
+    def __init__(self, in_channels: int, out_channels: int, terms: int = 6) -> None:
+        super().__init__()
+        if terms < 1:
+            raise ValueError(f"ChebConv needs at least one Chebyshev term, got {terms}")
+        self.weight = nn.Parameter(torch.empty(terms, in_channels, out_channels))
+        self.bias = nn.Parameter(torch.zeros(out_channels))
+        self.reset_parameters()
+
+    def reset_parameters(self) -> None:
+        """Draw the weights Xavier-uniformly with the fan of all terms together, and set the bias to zero."""
+        terms, fan_in, fan_out = self.weight.shape
+        bound = math.sqrt(6.0 / (terms * (fan_in + fan_out)))
+        nn.init.uniform_(self.weight, -bound, bound)
+        nn.init.zeros_(self.bias)
+
+    def forward(self, x: Tensor, stencil: Mapping[str, Tensor]) -> Tensor:
+        """Convolve the functions `x`, shape (N, C_in), with these arrays of `ScaledLaplacian`."""
+        return chebyshev_filter(stencil["indptr"], stencil["indices"], stencil["values"], x, self.weight) + self.bias
+
+    def extra_repr(self) -> str:
+        """Show the sizes when the module is printed."""
+        terms, fan_in, fan_out = self.weight.shape
+        return f"{fan_in}, {fan_out}, terms={terms}"
