@@ -11,10 +11,10 @@ from csm._types import FloatArray
 from csm.descriptors.angular import ByAngle
 from csm.descriptors.base import Features, as_operators
 from csm.descriptors.chebyshev import unit_rows
-from csm.descriptors.filters import filter_names, meyer_filters, unit_sums
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.operators.bundle import Operators
+from csm.operators.filters import filter_names, meyer_filters, unit_sums
 from csm.operators.frames import FrameKind
 from csm.operators.spectrum import Spectrum
 
@@ -24,7 +24,7 @@ class ASMWD(ByAngle):
     r"""Meyer wavelets of the anisotropic spectrum, each at its own centre; one block of columns per angle.
 
     For the angle theta_j = pi j / J, the eigenpairs of B(alpha, theta_j) and the filters g_s of
-    `csm.descriptors.filters.meyer_filters` up to lambda_K, divided by their sum over the K eigenvalues,
+    `csm.operators.filters.meyer_filters` up to lambda_K, divided by their sum over the K eigenvalues,
 
     .. math:: f_{j,s}(x) = \sum_{k=1}^{K} g_s(\lambda_k) \, \phi_k(x)^2, \qquad s = 1 \ldots S.
 

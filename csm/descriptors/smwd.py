@@ -8,10 +8,10 @@ from typing import Any, ClassVar, Literal, TypeAlias, get_args
 from csm.descriptors.asmwd import meyer_block
 from csm.descriptors.base import Features, as_operators
 from csm.descriptors.chebyshev import unit_rows
-from csm.descriptors.filters import filter_names, mexican_hat_filters
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.operators.bundle import Operators
+from csm.operators.filters import filter_names, mexican_hat_filters
 
 WaveletVariant: TypeAlias = Literal["meyer", "mexican"]
 
@@ -30,7 +30,7 @@ class SMWD:
     variant
         Which filters; a guess.  ``"meyer"``: those of `csm.descriptors.asmwd.ASMWD`, divided by their sums, so that
         this is its isotropic case, which the same group ships beside it and uses elsewhere.  ``"mexican"``: those of
-        `csm.descriptors.filters.mexican_hat_filters` as they are, the wavelets of the other spectral rival, WEDS.
+        `csm.operators.filters.mexican_hat_filters` as they are, the wavelets of the other spectral rival, WEDS.
     k
         K, number of eigenpairs, at least 2; a guess after the code of ASMWD.
     n_filters

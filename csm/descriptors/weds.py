@@ -9,10 +9,10 @@ import numpy as np
 
 from csm._types import Float32Array, FloatArray, IntArray
 from csm.descriptors.base import Features, as_operators
-from csm.descriptors.filters import filter_names, mexican_hat_filters
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.operators.bundle import Operators
+from csm.operators.filters import filter_names, mexican_hat_filters
 
 _BLOCK = 256  # columns of the N x N wavelets that are held at a time
 
@@ -21,7 +21,7 @@ _BLOCK = 256  # columns of the N x N wavelets that are held at a time
 class WEDS:
     r"""Energy of the surface's own coordinates in wavelet bands, gathered around every point by wavelets.
 
-    With the filters g_s of `csm.descriptors.filters.mexican_hat_filters`, the coordinates' coefficients
+    With the filters g_s of `csm.operators.filters.mexican_hat_filters`, the coordinates' coefficients
     c_m = sum_v a_v phi_m(v) x_v, and w_m = lambda_m^2 sum_l g_l(lambda_m)^2, the energy of band s at a vertex v is
 
     .. math:: E_s(v) = \Bigl| a_v \sum_m w_m g_s(\lambda_m) c_m \phi_m(v) \cdot

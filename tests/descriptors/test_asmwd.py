@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from csm.descriptors.asmwd import ASMWD
-from csm.descriptors.filters import meyer_filters
 from csm.errors import ConfigError, NumericalError
 from csm.mesh.shape import Mesh
 from csm.operators import Operators
+from csm.operators.filters import meyer_filters
 from tests.descriptors.invariances import CHECKS, assert_close, mirrored
 from tests.shapes import blob, sphere
 

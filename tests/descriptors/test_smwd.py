@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from csm.descriptors.asmwd import ASMWD
-from csm.descriptors.filters import mexican_hat_filters
 from csm.descriptors.smwd import SMWD
 from csm.errors import ConfigError
 from csm.operators import Operators
+from csm.operators.filters import mexican_hat_filters
 from tests.descriptors.invariances import CHECKS, assert_close, mirrored
 from tests.shapes import blob
 

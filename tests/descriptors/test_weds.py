@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from csm.descriptors.filters import mexican_hat_filters
 from csm.descriptors.weds import WEDS, aggregate, gathering_filters, wavelet_energies
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.operators import Operators
+from csm.operators.filters import mexican_hat_filters
 from tests.descriptors.invariances import CHECKS, assert_close, mirrored
 from tests.shapes import blob, sphere
 

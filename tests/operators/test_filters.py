@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from csm.descriptors.filters import filter_names, mexican_hat_filters, meyer_filters, unit_sums
+from csm.operators.filters import filter_names, mexican_hat_filters, meyer_filters, unit_sums
 
 
 def meyer_by_cases(x: float, low_pass: bool) -> float:
