@@ -11,22 +11,27 @@ from typing import Any, Protocol
 
 from torch import Tensor, nn
 
+from csm.networks.acscnn import ACSCNN, ACSConv
 from csm.networks.basis import Basis
 from csm.networks.chebynet import ChebyNet
 from csm.networks.csmcnn import CSMCNN
 from csm.networks.csmconv import CSMConv
+from csm.networks.diffusionnet import DiffusionNet
 from csm.networks.mlp import MLP
 from csm.networks.splinecnn import SplineCNN
 from csm.networks.surface import Surface
 
 __all__ = [
+    "ACSCNN",
     "CSMCNN",
     "MLP",
     "NETWORKS",
+    "ACSConv",
     "Basis",
     "CSMConv",
     "ChebyNet",
     "CorrespondenceNetwork",
+    "DiffusionNet",
     "SplineCNN",
     "Surface",
     "build",
@@ -46,8 +51,10 @@ class CorrespondenceNetwork(Protocol):
 
 
 NETWORKS: dict[str, type[nn.Module]] = {
+    "acscnn": ACSCNN,
     "chebynet": ChebyNet,
     "csmcnn": CSMCNN,
+    "diffusionnet": DiffusionNet,
     "mlp": MLP,
     "splinecnn": SplineCNN,
 }

@@ -9,8 +9,10 @@ from __future__ import annotations
 from typing import Any, ClassVar, Protocol
 
 from csm._types import Arrays
+from csm.operators.anisotropic import AnisotropicLaplacians
 from csm.operators.bundle import Operators
 from csm.operators.edgesplines import EdgeSplines
+from csm.operators.gradients import VertexGradients
 from csm.operators.scaledlaplacian import ScaledLaplacian
 
 
@@ -29,8 +31,10 @@ class Stencil(Protocol):
 
 
 STENCILS: dict[str, type[Stencil]] = {
+    AnisotropicLaplacians.name: AnisotropicLaplacians,
     EdgeSplines.name: EdgeSplines,
     ScaledLaplacian.name: ScaledLaplacian,
+    VertexGradients.name: VertexGradients,
 }
 
 
