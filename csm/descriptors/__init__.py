@@ -6,11 +6,13 @@ Examples
 ('theta=0.000 T0', 'theta=0.000 T1')
 """
 
+from csm.descriptors.add import ADD
 from csm.descriptors.amks import AMKS
 from csm.descriptors.asmwd import ASMWD
 from csm.descriptors.awft import AWFT
 from csm.descriptors.base import Descriptor, Features
 from csm.descriptors.chebyshev import ACD
+from csm.descriptors.constant import Constant
 from csm.descriptors.coordinates import Coordinates
 from csm.descriptors.dep import DEP
 from csm.descriptors.gps import GPS
@@ -25,6 +27,7 @@ from csm.descriptors.wft import WFT
 
 __all__ = [
     "ACD",
+    "ADD",
     "AMKS",
     "ASMWD",
     "AWFT",
@@ -37,6 +40,7 @@ __all__ = [
     "WEDS",
     "WFT",
     "WKS",
+    "Constant",
     "Coordinates",
     "Descriptor",
     "Features",

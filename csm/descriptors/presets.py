@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import fields, replace
 from typing import Any
 
+from csm.descriptors.add import ADD
 from csm.descriptors.amks import AMKS
 from csm.descriptors.asmwd import ASMWD
 from csm.descriptors.awft import AWFT
 from csm.descriptors.base import Descriptor
 from csm.descriptors.chebyshev import ACD
+from csm.descriptors.constant import Constant
 from csm.descriptors.coordinates import Coordinates
 from csm.descriptors.dep import DEP
 from csm.descriptors.gps import GPS
@@ -49,7 +51,9 @@ PRESETS: dict[str, Descriptor] = {
     "wft": WFT(),
     "awft": AWFT(),
     "asmwd": ASMWD(),
+    "add": ADD(),
     "gps": GPS(),
+    "constant": Constant(),
     "xyz": Coordinates(),
 }
 """Named settings; "acd_release_frame" reproduces the authors' output with their frame, world axes and all."""

@@ -192,7 +192,7 @@ class _SplineMessages(torch.autograd.Function):
         dw, room = torch.zeros_like(weight), torch.empty_like(x)
         for point, targets, rows in _gathered(dy.contiguous(), ctx.stencil):
             mirrored = len(weight) - 1 - point
-            torch.mm(x[targets].T, rows, out=dw[mirrored])
+            torch.mm(x.index_select(0, targets).T, rows, out=dw[mirrored])
             if dx is not None:
                 dx.index_add_(0, targets, torch.mm(rows, weight[mirrored].T, out=room[: len(rows)]))
         return dx, dw, None

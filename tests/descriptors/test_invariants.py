@@ -11,7 +11,8 @@ from csm.descriptors import PRESETS, Descriptor
 from tests.descriptors.invariances import CHECKS, mirrored, rigid_motion
 from tests.shapes import blob
 
-LEFT_RIGHT = ["acd", "acd_frames", "acd_paper", "acd_release", "acd_release_frame", "asmwd", "awft", "shot", "xyz"]
+ACDS = ["acd", "acd_frames", "acd_paper", "acd_release", "acd_release_frame"]
+LEFT_RIGHT = [*ACDS, "add", "asmwd", "awft", "shot", "xyz"]
 
 
 def small(name: str) -> Descriptor:

@@ -14,8 +14,8 @@ def test_paper_and_release_are_the_settings_of_the_table():
     assert preset("acd_release_frame") == ACD(4, 8, 70, 5, True, "released", 10)
 
 
-@pytest.mark.parametrize("name", [name for name in PRESETS if PRESETS[name].name not in ("stack", "xyz")])
-def test_every_preset_lets_every_parameter_be_replaced(name):
+@pytest.mark.parametrize("name", [name for name in PRESETS if {"k", "bins"} & set(PRESETS[name].parameters())])
+def test_a_preset_lets_its_parameters_be_replaced(name):
     before = preset(name).parameters()
     key = "k" if "k" in before else "bins"
     assert preset(name, **{key: 33}).parameters() == before | {key: 33}
