@@ -17,6 +17,8 @@ from csm.networks.chebynet import ChebyNet
 from csm.networks.csmcnn import CSMCNN
 from csm.networks.csmconv import CSMConv
 from csm.networks.diffusionnet import DiffusionNet
+from csm.networks.mgcn import MGCN
+from csm.networks.mgconv import MGConv
 from csm.networks.mlp import MLP
 from csm.networks.splinecnn import SplineCNN
 from csm.networks.surface import Surface
@@ -24,6 +26,7 @@ from csm.networks.surface import Surface
 __all__ = [
     "ACSCNN",
     "CSMCNN",
+    "MGCN",
     "MLP",
     "NETWORKS",
     "ACSConv",
@@ -32,6 +35,7 @@ __all__ = [
     "ChebyNet",
     "CorrespondenceNetwork",
     "DiffusionNet",
+    "MGConv",
     "SplineCNN",
     "Surface",
     "build",
@@ -55,6 +59,7 @@ NETWORKS: dict[str, type[nn.Module]] = {
     "chebynet": ChebyNet,
     "csmcnn": CSMCNN,
     "diffusionnet": DiffusionNet,
+    "mgcn": MGCN,
     "mlp": MLP,
     "splinecnn": SplineCNN,
 }

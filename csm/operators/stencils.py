@@ -14,6 +14,7 @@ from csm.operators.bundle import Operators
 from csm.operators.edgesplines import EdgeSplines
 from csm.operators.gradients import VertexGradients
 from csm.operators.scaledlaplacian import ScaledLaplacian
+from csm.operators.wavelets import Wavelets
 
 
 class Stencil(Protocol):
@@ -35,6 +36,7 @@ STENCILS: dict[str, type[Stencil]] = {
     EdgeSplines.name: EdgeSplines,
     ScaledLaplacian.name: ScaledLaplacian,
     VertexGradients.name: VertexGradients,
+    Wavelets.name: Wavelets,
 }
 
 

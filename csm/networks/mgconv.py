@@ -1,0 +1,167 @@
+"""The multiscale convolution of MGCN, without its N x N operators."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any, Literal, NamedTuple
+
+import torch
+from torch import Tensor, nn
+from torch.autograd.function import once_differentiable
+
+Products = Literal["float32", "bfloat16"]
+
+HELD_BYTES = 3e9
+"""Blocks up to this size are held from layer to layer; of greater ones each is made again whenever it is needed."""
+
+
+class Patch(NamedTuple):
+    """A patch of vertices, those that its wavelets reach, and per wavelet the kernel's fourth powers between them.
+
+    Shapes: `rows` (R,), `columns` (Q,), of each power (R, Q_s) for the first Q_s columns, `sums` (R, S) along these.
+    """
+
+    rows: Tensor
+    columns: Tensor
+    powers: list[Tensor]
+    sums: Tensor
+
+
+class WaveletOperators:
+    """The operators G_1 .. G_S of one shape, patch by patch (see `csm.operators.wavelets.Wavelets`).
+
+    Parameters
+    ----------
+    stencil
+        The tensors of the stencil "wavelets".
+    dtype
+        Of the functions that the operators are applied to.
+    products
+        "float32" multiplies in the functions' own precision; "bfloat16" rounds kernel and functions to eight bits,
+        which processors with matrix units for that are several times faster at.
+    """
+
+    def __init__(self, stencil: Mapping[str, Tensor], dtype: torch.dtype, products: Products = "float32") -> None:
+        self._evecs, self._responses = stencil["evecs"].to(dtype), stencil["responses"].to(dtype)
+        self._used = [int(response.count_nonzero()) for response in self._responses.T]  # they end in zeros
+        self._rows, self._columns = _split(stencil, "row"), _split(stencil, "column")
+        self._extents: list[list[int]] = stencil["extents"].tolist()
+        self.dtype = torch.bfloat16 if products == "bfloat16" else dtype
+        self._held = list(self._make()) if self.n_bytes <= HELD_BYTES else None
+
+    @property
+    def n_wavelets(self) -> int:
+        """Number S of operators."""
+        return self._responses.shape[1]
+
+    @property
+    def n_bytes(self) -> int:
+        """Size of all blocks."""
+        entries = sum(len(rows) * sum(extents) for rows, extents in zip(self._rows, self._extents, strict=True))
+        return entries * self.dtype.itemsize
+
+    def __iter__(self) -> Iterator[Patch]:
+        """Go through the patches."""
+        return self._make() if self._held is None else iter(self._held)
+
+    def _make(self) -> Iterator[Patch]:
+        for rows, columns, extents in zip(self._rows, self._columns, self._extents, strict=True):
+            near, far = self._evecs[rows], self._evecs[columns]
+            powers = [self._powers(s, near, far[:extent]) for s, extent in enumerate(extents)]
+            sums = torch.stack([p.sum(1, dtype=self._evecs.dtype) for p in powers], 1)
+            yield Patch(rows, columns, powers, sums.clamp_min(torch.finfo(sums.dtype).tiny))
+
+    def _powers(self, s: int, near: Tensor, far: Tensor) -> Tensor:
+        used = self._used[s]
+        squares = ((near[:, :used] * self._responses[:used, s]) @ far[:, :used].T).square_()
+        torch.threshold_(squares, 1e-15, 0.0)  # rounding, and denormal when squared, which is slow
+        return squares.square_().to(self.dtype)
+
+    def averages(self, x: Tensor) -> Tensor:
+        """Return G_s^T x, shape (N, S, C), of the functions `x`, shape (N, C): averages that a wavelet weights."""
+        y: Tensor = _Averages.apply(x, self)  # type: ignore[no-untyped-call]
+        return y
+
+
+class _Averages(torch.autograd.Function):
+    """`WaveletOperators.averages`, whose gradient goes back through the same blocks."""
+
+    @staticmethod
+    def forward(ctx: Any, x: Tensor, operators: WaveletOperators) -> Tensor:
+        ctx.operators = operators
+        y = x.new_empty(x.shape[0], operators.n_wavelets, x.shape[1])
+        rounded = x.to(operators.dtype)
+        for patch in operators:
+            seen = rounded[patch.columns]
+            sums = torch.stack([p @ seen[: p.shape[1]] for p in patch.powers], 1)
+            y[patch.rows] = sums / patch.sums[:, :, None]
+        return y
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, None]:
+        operators: WaveletOperators = ctx.operators
+        back = grad.new_zeros(grad.shape[0], grad.shape[2])
+        for patch in operators:
+            share = (grad[patch.rows] / patch.sums[:, :, None]).to(operators.dtype)
+            seen = grad.new_zeros(len(patch.columns), grad.shape[2])
+            for s, power in enumerate(patch.powers):
+                seen[: power.shape[1]] += power.T @ share[:, s]
+            back.index_add_(0, patch.columns, seen)
+        return back, None
+
+
+class MGConv(nn.Module):
+    r"""Multiscale graph convolution with fixed wavelets.
+
+    .. math:: y = \hat x W_0 + \sum_{s=1}^{S} G_s^\top \hat x \, W_s, \qquad
+              \hat x = \frac{x - \min x}{\max x - \min x} \text{ per channel and shape}
+
+    without bias (a channel that is constant becomes 0).
+
+    Parameters
+    ----------
+    in_channels, out_channels
+        Channels C_in of the input and C_out of the output functions.
+    wavelets
+        Number S of operators.
+
+    Shapes
+    ------
+    input (N, C_in), output (N, C_out); weight (S + 1, C_in, C_out).
+    """
+
+    def __init__(self, in_channels: int, out_channels: int, wavelets: int = 16) -> None:
+        super().__init__()
+        self.weight = nn.Parameter(torch.empty(wavelets + 1, in_channels, out_channels))
+        self.reset_parameters()
+
+    def reset_parameters(self) -> None:
+        """Draw every W_s Xavier-uniformly."""
+        bound = math.sqrt(6.0 / sum(self.weight.shape[1:]))
+        nn.init.uniform_(self.weight, -bound, bound)
+
+    def forward(self, x: Tensor, operators: WaveletOperators) -> Tensor:
+        """Convolve the functions `x`, shape (N, C_in)."""
+        x = unit_range(x)
+        return x @ self.weight[0] + operators.averages(x).flatten(1) @ self.weight[1:].flatten(0, 1)
+
+    def extra_repr(self) -> str:
+        """Show the sizes when the module is printed."""
+        terms, fan_in, fan_out = self.weight.shape
+        return f"{fan_in}, {fan_out}, wavelets={terms - 1}"
+
+
+def unit_range(x: Tensor) -> Tensor:
+    """Shift and scale each column of `x`, shape (N, C), to run from 0 to 1; constant columns become 0."""
+    least, most = x.amin(0), x.amax(0)
+    width = most - least
+    return (x - least) / torch.where(width > 0, width, torch.ones_like(width))
+
+
+def _split(stencil: Mapping[str, Tensor], kind: str) -> list[Tensor]:
+    """Cut the list of rows or columns into those of the patches."""
+    ends = stencil[f"{kind}_ends"].tolist()
+    return [stencil[f"{kind}s"][a:b] for a, b in itertools.pairwise([0, *ends])]
