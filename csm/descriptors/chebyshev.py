@@ -34,7 +34,11 @@ class ACD(ByAngle):
     k
         K, eigenpairs per angle, at least 2.
     order
-        D, so each angle has the D + 1 columns T_0 .. T_D.
+        D, so each angle has the D + 1 columns T_0 .. T_D per cut.
+    cuts
+        How often the sum is taken, each time with one eigenpair less: to K, K - 1, ...  The polynomials are scaled to
+        the last eigenvalue of the sum, so where this one is close to the next, a small change of pose changes all
+        columns; with several cuts not all of them at once.
     normalise
         Scale each row to unit length.
     frame, sweeps, smoothing
@@ -70,21 +74,24 @@ class ACD(ByAngle):
     sweeps: int = 3
     smoothing: float = 0.08
     centred: bool = False
+    cuts: int = 1
 
     name: ClassVar[str] = "acd"
 
     def __post_init__(self) -> None:
-        if self.angles < 1 or self.k < 2 or self.order < 0 or not self.alpha >= 0:
-            raise ConfigError(f"{self}: wanted alpha >= 0, angles >= 1, k >= 2 and order >= 0")
+        if self.angles < 1 or self.order < 0 or not self.alpha >= 0:
+            raise ConfigError(f"{self}: wanted alpha >= 0, angles >= 1 and order >= 0")
+        if self.cuts < 1 or self.k - self.cuts < 1:
+            raise ConfigError(f"{self}: wanted cuts >= 1, and k >= 2 eigenpairs in the last of them")
         self._require_different_angles()
 
     @classmethod
     def own(cls) -> ACD:
-        """Return csm's own settings: smooth frames, T_0 .. T_8, centred columns.
+        """Return csm's own settings: smooth frames, sums to 11, 10, 9 and 8 eigenpairs, T_0 .. T_7, centred columns.
 
         Chosen by nearest-neighbour matching of FAUST shapes 0 to 79 and of TOSCA's cats, dogs and wolves.
         """
-        return cls(order=8, frame="smooth", centred=True)
+        return cls(k=11, order=7, frame="smooth", centred=True, cuts=4)
 
     @classmethod
     def release(cls, *, frame: FrameKind = "line_field", sweeps: int = 3) -> ACD:
@@ -93,13 +100,21 @@ class ACD(ByAngle):
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names of the J (D + 1) columns, angle by angle."""
-        return tuple(f"theta={theta:.3f} T{d}" for theta in self.thetas for d in range(self.order + 1))
+        """Names of the columns, J (D + 1) per cut: angle by angle, cut by cut."""
+        cuts = [""] if self.cuts == 1 else [f" K={k}" for k in self._ks]
+        return tuple(
+            f"theta={theta:.3f}{cut} T{d}" for theta in self.thetas for cut in cuts for d in range(self.order + 1)
+        )
+
+    @property
+    def _ks(self) -> range:
+        return range(self.k, self.k - self.cuts, -1)
 
     def __call__(self, shape: Mesh | Operators) -> Features:
-        """Return the descriptor of every vertex, (N, J (D + 1)), in units of 1/area unless normalised."""
+        """Return the descriptor of every vertex, one column per name, in units of 1/area unless normalised."""
         operators = as_operators(shape)
-        values = np.hstack([chebyshev_block(self._spectrum(operators, theta), self.order) for theta in self.thetas])
+        spectra = [self._spectrum(operators, theta) for theta in self.thetas]
+        values = np.hstack([chebyshev_block(s.first(k), self.order) for s in spectra for k in self._ks])
         if self.centred:
             values -= operators.mass @ values / operators.mass.sum()
         return Features(unit_rows(values) if self.normalise else values, self.columns)

@@ -89,7 +89,9 @@ def test_isotropic_needs_no_frame_and_is_one_block():
         ACD(alpha=0.0)
 
 
-@pytest.mark.parametrize("wrong", [{"alpha": -1}, {"angles": 0}, {"k": 1}, {"order": -1}, {"alpha": float("nan")}])
+@pytest.mark.parametrize(
+    "wrong", [{"alpha": -1}, {"angles": 0}, {"k": 1}, {"order": -1}, {"alpha": float("nan")}, {"cuts": 0}, {"cuts": 9}]
+)
 def test_settings_out_of_range_are_refused(wrong):
     with pytest.raises(ConfigError, match="wanted"):
         ACD(**wrong)
@@ -109,6 +111,18 @@ def test_centred_columns_have_no_mean_over_the_surface():
     plain, centred = (ACD(angles=3, centred=flag)(operators).values for flag in (False, True))
     np.testing.assert_allclose(operators.mass @ centred, 0, atol=1e-12)
     np.testing.assert_allclose(plain - centred, np.tile(operators.mass @ plain, (len(plain), 1)), atol=1e-12)
+
+
+def test_every_cut_is_the_descriptor_of_so_many_pairs():
+    operators = Operators(blob(2))
+    several = ACD(angles=3, k=7, order=2, cuts=3)(operators)
+    for column, name in enumerate(several.columns):
+        _, k, polynomial = name.split()
+        single = ACD(angles=3, k=int(k.removeprefix("K=")), order=2)(operators)
+        alone = single.columns.index(name.replace(f" {k}", ""))
+        assert polynomial in single.columns[alone]
+        np.testing.assert_array_equal(several.values[:, column], single.values[:, alone])
+    assert {name.split()[1] for name in several.columns} == {"K=7", "K=6", "K=5"}
 
 
 @pytest.mark.data
