@@ -16,7 +16,7 @@ from hydra import compose
 from omegaconf import DictConfig, open_dict
 
 from csm.commands.app import command, make_datamodule
-from csm.commands.testing import protocol_of, test_on
+from csm.commands.testing import Matching, protocol_of, test_on
 from csm.commands.train import fit
 from csm.data.datamodule import CorrespondenceDataModule
 from csm.errors import ConfigError, CsmError
@@ -71,6 +71,7 @@ class Cells:
     def __init__(self, cfg: DictConfig, name: str, overrides: Sequence[str], seed: int, folder: Path) -> None:
         self.name, self.seed, self.folder, self.table = name, seed, folder, str(cfg.table)
         self.protocol = protocol_of(cfg.metric)
+        self.matchings = list(cfg.matching)
         last = folder / "checkpoints" / "last.ckpt"
         self.train_cfg = compose("train", overrides=[*overrides, *cfg.overrides])
         with open_dict(self.train_cfg):
@@ -97,16 +98,18 @@ class Cells:
 
     def fill(self) -> list[ResultRow]:
         """Return the row of every test set, from its file where that answers the same question."""
-        return [self._cell(name) for name in self.datamodule.test_sets]
+        return [self._cell(name, matching) for matching in self.matchings for name in self.datamodule.test_sets]
 
-    def _cell(self, test: str) -> ResultRow:
-        path = self.folder / f"{test}_{self.protocol.distance}_{self.protocol.normaliser}.json"
+    def _cell(self, test: str, matching: Matching) -> ResultRow:
+        kind = "" if matching == "nearest" else f"_{matching}"
+        path = self.folder / f"{test}_{self.protocol.distance}_{self.protocol.normaliser}{kind}.json"
         if path.exists():
             (row,) = read_rows(path)
             if row.protocol == self.protocol.describe(row.pairs):
                 return row
             _log.warning("%s answers another protocol (%s); it is made again", path, row.protocol)
-        tested = test_on(self.module, self.datamodule, self.datamodule.test_sets[test], self.protocol, self.table)
+        shapes = self.datamodule.test_sets[test]
+        tested = test_on(self.module, self.datamodule, shapes, self.protocol, self.table, matching)
         write_rows(path, [tested.row])
         write_curves_csv(path.with_suffix(".cqc.csv"), {test: tested.evaluation})
         return tested.row

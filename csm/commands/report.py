@@ -12,7 +12,6 @@ import numpy as np
 from csm._types import FloatArray, IntArray
 from csm.commands.testing import Tested
 from csm.data.shapeset import Shape
-from csm.evaluation.matching import nearest
 from csm.evaluation.protocol import evaluate_matches
 from csm.evaluation.report import ResultRow, add_rows, write_curves_csv, write_rows, write_table_csv
 from csm.evaluation.tables import markdown_table
@@ -35,7 +34,7 @@ def conclude(tested: Sequence[Tested], folder: Path, results: str | None, notes:
     rows = [t.row for t in tested]
     write_rows(folder / "rows.json", rows)
     write_table_csv(folder / "rows.csv", rows)
-    write_curves_csv(folder / "cqc.csv", {t.row.test: t.evaluation for t in tested})
+    write_curves_csv(folder / "cqc.csv", {t.label: t.evaluation for t in tested})
     if results:
         add_rows(results, rows)
     page = write_report(folder, f"{rows[0].method}, trained on {rows[0].train}", tested, notes)
@@ -58,7 +57,7 @@ def write_report(folder: Path, title: str, tested: Sequence[Tested], notes: str 
         A paragraph for the top of the page: what was trained on what.
     """
     rows = [t.row for t in tested]
-    curves = cqc_figure({t.row.test: t.evaluation for t in tested}, normaliser=rows[0].normaliser)
+    curves = cqc_figure({t.label: t.evaluation for t in tested}, normaliser=rows[0].normaliser)
     save_figure(folder / "cqc.png", curves)
     maps = [_example(t, folder) for t in tested]
     sections = [
@@ -90,14 +89,14 @@ def _example(tested: Tested, folder: Path) -> tuple[Figure, Viewer]:
     typical = pairs[len(pairs) // 2]
     by_name = {shape.name: shape for shape in tested.shapes}
     source, target = by_name[typical.source], by_name[typical.target]
-    indices = nearest(tested.descriptors[source.name], tested.descriptors[target.name])
+    indices = tested.maps.between(source.name, target.name)
     errors = _vertex_errors(tested, source, target, indices)
     normaliser = tested.row.normaliser
     view = _view(tested.shapes)
     figure = correspondence_figure(source.mesh, target.mesh, indices, errors, view=view, normaliser=normaliser)
-    save_figure(folder / f"map_{tested.row.test}.png", figure)
+    save_figure(folder / f"map_{tested.label.replace(', ', '_')}.png", figure)
     caption = (
-        f"{tested.row.test}: {source.name} to {target.name}, the pair with the median error of its set "
+        f"{tested.label}: {source.name} to {target.name}, the pair with the median error of its set "
         f"({1000 * typical.age:.1f} thousandths of the {normaliser}); "
         "the colours of the errors are heat-method distances at all vertices"
     )

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, TypeAlias, get_args
 
 from omegaconf import DictConfig, OmegaConf
 from torch import Tensor
@@ -15,22 +15,45 @@ from csm.data.datamodule import CorrespondenceDataModule
 from csm.data.prepare import Job, processes
 from csm.data.shapeset import Shape, ShapeSet
 from csm.errors import ConfigError
-from csm.evaluation.matching import nearest
+from csm.evaluation.matching import Votes, nearest
 from csm.evaluation.protocol import Protocol, evaluate_matches
 from csm.evaluation.provenance import provenance
 from csm.evaluation.report import ResultRow, result_row
 from csm.evaluation.results import Evaluation
 from csm.learning.module import CSMModule
 
+Matching: TypeAlias = Literal["nearest", "argmax"]
+"""Nearest neighbour of the learned descriptor, or through the template by the classifier's votes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Maps:
+    """Maps between any two shapes of a set, from their learned descriptors or, where given, the classifier's votes."""
+
+    descriptors: Mapping[str, Tensor]
+    votes: Mapping[str, Votes] | None = None
+
+    def between(self, source: str, target: str, at: IntArray | None = None) -> IntArray:
+        """Return for each source vertex (or those of `at`, -1 for the others) a vertex of the target."""
+        if self.votes is not None:
+            return self.votes[source].to(self.votes[target])
+        return nearest(self.descriptors[source], self.descriptors[target], at=at)
+
 
 @dataclass(frozen=True, eq=False)
 class Tested:
-    """One test set: its result row, the evaluation behind it, and the shapes and descriptors for pictures."""
+    """One test set: its result row, the evaluation behind it, and for pictures the shapes and how they were matched."""
 
     row: ResultRow
     evaluation: Evaluation
     shapes: list[Shape]
-    descriptors: dict[str, Tensor]
+    maps: Maps
+    matching: Matching
+
+    @property
+    def label(self) -> str:
+        """The test set, and how it was matched if not by the nearest neighbour."""
+        return self.row.test if self.matching == "nearest" else f"{self.row.test}, {self.matching}"
 
 
 def protocol_of(cfg: DictConfig) -> Protocol:
@@ -43,9 +66,19 @@ def protocol_of(cfg: DictConfig) -> Protocol:
 
 
 def test_on(
-    module: CSMModule, datamodule: CorrespondenceDataModule, shapes: ShapeSet, protocol: Protocol, table: str
+    module: CSMModule,
+    datamodule: CorrespondenceDataModule,
+    shapes: ShapeSet,
+    protocol: Protocol,
+    table: str,
+    matching: Matching,
 ) -> Tested:
-    """Compute the learned descriptor of every test shape of a set, match by nearest neighbour, and measure."""
+    """Compute the learned descriptor of every test shape of a set, match, and measure.
+
+    Rows of a matching other than "nearest" say so in the name of their method.
+    """
+    if matching not in get_args(Matching):
+        raise ConfigError(f"matching={matching!r}; wanted {' or '.join(get_args(Matching))}")
     names = datamodule.test_names(shapes)
     datamodule.fill([Job(shapes, name) for name in names])
     loaded = [datamodule.load(shapes, name) for name in names]
@@ -54,8 +87,11 @@ def test_on(
         for item in progress_bar(loaded, desc=f"describe {shapes.name}", unit="shape", leave=False)
     }
 
+    said = {name: module.votes(d) for name, d in descriptors.items()} if matching == "argmax" else None
+    maps = Maps(descriptors, said)
+
     def match(source: Shape, target: Shape) -> IntArray:
-        return nearest(descriptors[source.name], descriptors[target.name], at=source.truth.known)
+        return maps.between(source.name, target.name, at=source.truth.known)
 
     workers = processes(datamodule.workers, len(names))
     evaluation = evaluate_matches([item.shape for item in loaded], match, protocol, workers=workers)
@@ -64,25 +100,29 @@ def test_on(
         [evaluation],
         provenance(),
         table=table,
-        method=training["name"],
+        method=training["name"] + ("" if matching == "nearest" else f", {matching}"),
         train=training["set"],
         test=shapes.name,
         seeds=[training["seed"]],
         epochs=training["epochs"],
     )
-    return Tested(row, evaluation, [item.shape for item in loaded], descriptors)
+    return Tested(row, evaluation, [item.shape for item in loaded], maps, matching)
 
 
 def test_all(cfg: DictConfig, module: CSMModule, datamodule: CorrespondenceDataModule) -> list[Tested]:
     """Test on every test set of a data module, by the protocol of the configuration."""
     protocol = protocol_of(cfg.metric)
-    return [test_on(module, datamodule, shapes, protocol, cfg.table) for shapes in datamodule.test_sets.values()]
+    return [
+        test_on(module, datamodule, shapes, protocol, cfg.table, matching)
+        for matching in cfg.matching
+        for shapes in datamodule.test_sets.values()
+    ]
 
 
 def numbers(tested: Sequence[Tested]) -> dict[str, float]:
     """Return the errors by test set, flat, for the job's record and for sweep tables."""
     return {
-        f"{key}/{t.row.test}": float(value)
+        f"{key}/{t.label}": float(value)
         for t in tested
         for key, value in (("age", t.row.age), ("exact", t.row.exact_match))
     }

@@ -29,14 +29,6 @@ PRESETS: dict[str, Descriptor] = {
     "acd_paper": ACD(),
     "acd_release": ACD.release(),
     "acd_release_frame": ACD.release(frame="released", sweeps=10),
-    "acd_frames": Stack(
-        {
-            "rings": ACD(),
-            "fine": ACD(frame="smooth", smoothing=0.04),
-            "middle": ACD(frame="smooth", smoothing=0.08),
-            "coarse": ACD(frame="smooth", smoothing=0.16),
-        }
-    ),
     "acd_isotropic": ACD(alpha=0.0, angles=1),
     "hks": HKS(),
     "hks_diffusionnet": HKS(k=128, n_times=16, scaled=False, first=0.01, last=1.0),

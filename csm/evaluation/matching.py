@@ -17,6 +17,26 @@ _MAX_ELEMENTS = 2**25  # of one block of distances: 128 MiB in float32
 
 
 @dataclass(frozen=True, eq=False)
+class Votes:
+    """What a classifier over the template says of one shape.
+
+    Parameters
+    ----------
+    classes
+        Shape (N,): for each vertex the template point of greatest probability.
+    vertices
+        Shape (C,): for each template point the vertex that gives it the greatest probability.
+    """
+
+    classes: IntArray
+    vertices: IntArray
+
+    def to(self, target: Votes) -> IntArray:
+        """Return the map through the template, shape (N,): for each vertex of this shape a vertex of `target`."""
+        return target.vertices[self.classes]
+
+
+@dataclass(frozen=True, eq=False)
 class Match:
     """A map from every vertex of one shape to a vertex of another.
 
@@ -44,6 +64,29 @@ class Match:
 def match_features(source: Rows, target: Rows, *, source_name: str = "", target_name: str = "") -> Match:
     """Match each of N_source rows to the nearest of N_target rows (see `nearest`)."""
     return Match(nearest(source, target), len(target), source_name, target_name)
+
+
+def votes(descriptor: torch.Tensor, weight: torch.Tensor, bias: torch.Tensor, *, block: int = 1024) -> Votes:
+    """Let a linear classifier with softmax decide, in blocks of bounded memory.
+
+    Parameters
+    ----------
+    descriptor
+        Shape (N, Q).
+    weight, bias
+        Of the classifier, shapes (C, Q) and (C,).
+    block
+        Vertices at a time.
+    """
+    classes, best, vertices = [], torch.full((len(weight),), -torch.inf), torch.zeros(len(weight), dtype=torch.int64)
+    with torch.no_grad():
+        for begin in range(0, len(descriptor), block):
+            scores = torch.log_softmax(torch.addmm(bias, descriptor[begin : begin + block], weight.T), 1)
+            classes.append(scores.argmax(1))
+            score, row = scores.max(0)
+            vertices = torch.where(score > best, row + begin, vertices)
+            best = torch.maximum(score, best)
+    return Votes(torch.cat(classes).numpy(), vertices.numpy())
 
 
 def nearest(queries: Rows, candidates: Rows, *, at: IntArray | None = None, block: int = 256) -> IntArray:

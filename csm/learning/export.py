@@ -85,4 +85,5 @@ def _load_export(path: Path) -> CSMModule:
         if not spared and own.get(name) != given.get(name):
             raise DataError(f"{path}: the weights beside it belong to another network (they differ in {name})")
     module.network.load_state_dict(weights, strict=False)
+    module.has_classifier = "classifier.weight" in weights
     return module

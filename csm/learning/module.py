@@ -12,6 +12,7 @@ from torch.optim.lr_scheduler import CosineAnnealingLR, LRScheduler, OneCycleLR,
 
 from csm.data.datamodule import ShapeSample
 from csm.errors import ConfigError
+from csm.evaluation.matching import Votes, votes
 from csm.learning.loss import Products, linear_cross_entropy
 from csm.networks import CorrespondenceNetwork, Surface, build
 
@@ -83,6 +84,7 @@ class CSMModule(L.LightningModule):
                 f"the network wants {wanted} eigenpairs, the data hold {basis_k}: set data.basis_k={wanted} or a "
                 "smaller model.ks"
             )
+        self.has_classifier = True
         self.lr, self.weight_decay, self.schedule = lr, weight_decay, schedule
         if loss_rows is not None and loss_rows < 1:
             raise ConfigError(f"loss_rows={loss_rows}; wanted a number of vertices from 1, or none for all")
@@ -125,6 +127,19 @@ class CSMModule(L.LightningModule):
         self.eval()
         descriptor: Tensor = self(sample.features.to(self.device), sample.surface.to(self.device))
         return descriptor.cpu()
+
+    def votes(self, descriptor: Tensor) -> Votes:
+        """Return what the classifier says of a shape with this learned descriptor, shape (N, Q).
+
+        Raises
+        ------
+        ConfigError
+            If the network was loaded from an export without its classifier.
+        """
+        if not self.has_classifier:
+            raise ConfigError("matching=argmax needs the classifier, which the export leaves out: use the .ckpt file")
+        classifier = self._net.classifier
+        return votes(descriptor, classifier.weight.detach().cpu(), classifier.bias.detach().cpu())
 
     def configure_optimizers(self) -> Any:
         """Adam with the chosen schedule, stepped once per training step."""

@@ -99,6 +99,20 @@ def test_a_checkpoint_evaluates_to_the_same_numbers_without_its_config(bench, tr
     assert bench.json("eval/result.json")["age/toys"] == pytest.approx(bench.json("run/result.json")["age/toys"])
 
 
+def test_the_classifier_matches_as_well_where_it_is_there(bench, trained, capsys):
+    options = ["data=folder", "data.root=toys", "data.n_test=2", "hydra.run.dir=votes", POINTS]
+    bench.run("evaluate", "checkpoint=run/model.ckpt", "matching=[nearest,argmax]", *options)
+    by_descriptor, by_class = read_rows(bench.folder / "votes/rows.json")
+    assert (by_descriptor.method, by_class.method) == ("toy", "toy, argmax")
+    assert 0 < by_class.age < 0.1
+    assert by_class.age != by_descriptor.age
+    assert (bench.folder / "votes/map_toys_argmax.png").exists()
+    assert (bench.folder / "votes/cqc.csv").read_text().startswith('threshold,toys,"toys, argmax"')
+    with pytest.raises(SystemExit):
+        bench.run("evaluate", "checkpoint=run/export/model.json", "matching=[argmax]", *options)
+    assert "use the .ckpt" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("terminal", "wanted", "bar", "lines"), [(1, 1, 1, 0), (0, 1, 0, 1), (1, 0, 0, 0), (0, 0, 0, 0)]
 )

@@ -11,7 +11,7 @@ from csm.descriptors import PRESETS, Descriptor
 from tests.descriptors.invariances import CHECKS, mirrored, rigid_motion
 from tests.shapes import blob
 
-ACDS = ["acd", "acd_frames", "acd_paper", "acd_release", "acd_release_frame"]
+ACDS = ["acd", "acd_paper", "acd_release", "acd_release_frame"]
 LEFT_RIGHT = [*ACDS, "add", "asmwd", "awft", "shot", "xyz"]
 
 

@@ -9,7 +9,7 @@ from scipy.spatial.distance import cdist
 
 from csm.errors import ConfigError
 from csm.evaluation import matching
-from csm.evaluation.matching import match_features, nearest
+from csm.evaluation.matching import match_features, nearest, votes
 
 
 def features(n: int, width: int, seed: int) -> np.ndarray:
@@ -80,6 +80,18 @@ def test_only_the_vertices_asked_for() -> None:
         assert found[at].tolist() == nearest(q, c)[at].tolist()
         assert (np.delete(found, at) == -1).all()
     assert (nearest(q, c, at=np.array([], dtype=int)) == -1).all()
+
+
+@pytest.mark.parametrize("block", [3, 100])
+def test_votes_are_the_greatest_probabilities_by_row_and_by_column(block: int) -> None:
+    g = torch.Generator().manual_seed(0)
+    descriptor, other, weight, bias = (torch.randn(*n, generator=g) for n in ((20, 5), (13, 5), (9, 5), (9,)))
+    here, there = votes(descriptor, weight, bias, block=block), votes(other, weight, bias, block=block)
+    for rows, found in ((descriptor, here), (other, there)):
+        p = torch.softmax(rows @ weight.T + bias, 1).numpy()
+        np.testing.assert_array_equal(found.classes, p.argmax(1))
+        np.testing.assert_array_equal(found.vertices, p.argmax(0))
+    np.testing.assert_array_equal(here.to(there), [there.vertices[c] for c in here.classes])
 
 
 def test_match_knows_its_coverage_and_names() -> None:
