@@ -16,7 +16,7 @@ COMMANDS = {
     "prepare": "fill, check or prune the store of bases and descriptors",
     "check": "list what is wrong with the meshes of a folder",
     "reproduce": "make tables and figures of the paper again from data",
-    "bench": "measure how long the descriptors take",
+    "bench": "measure how long the descriptors or the networks take",
 }
 
 WORDS = {"check": "folder", "reproduce": "targets", "bench": "targets"}

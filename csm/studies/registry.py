@@ -26,6 +26,7 @@ class Study:
 STUDIES: Mapping[str, Study] = {
     "table1": Study("errors of nearest-neighbour matching, all descriptors", "csm.studies.table1"),
     "table2": Study("seconds over resolutions, all descriptors", "csm.studies.table2"),
+    "table6": Study("parameters, seconds and memory, all learned methods", "csm.studies.table6"),
     "figure2": Study("eigenvalues of one body across resolutions", "csm.studies.figure2"),
     "figure3": Study("errors over the parameters of ACD", "csm.studies.figure3"),
     "figure4": Study("share of points within an error, all descriptors", "csm.studies.figure4"),

@@ -26,7 +26,7 @@ def test_a_module_that_is_missing_disturbs_no_other_study(monkeypatch):
 
 
 def test_an_unknown_study_is_refused_with_those_that_there_are():
-    with pytest.raises(ConfigError, match="table1, table2, figure2"):
+    with pytest.raises(ConfigError, match="table1, table2, table6, figure2"):
         study("table9")
 
 

@@ -1,0 +1,46 @@
+"""The learned methods that are compared: each a network with its options and the descriptor that it is fed with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Contender:
+    """One learned method.
+
+    Parameters
+    ----------
+    title
+        What tables call it.
+    network, options
+        For `csm.networks.build`; what is not said keeps the default.
+    descriptor
+        Preset of its input.
+    basis_k
+        Eigenpairs that it needs.
+    paper_millions
+        Parameters in the paper's Table 6, in millions; None where it has none.
+    """
+
+    title: str
+    network: str
+    descriptor: str
+    options: Mapping[str, Any] = field(default_factory=dict)
+    basis_k: int = 128
+    paper_millions: float | None = None
+
+
+CONTENDERS: Mapping[str, Contender] = {
+    "csmcnn": Contender("CSMCNN", "csmcnn", "acd_release", {"momentum": 1e-3, "eps": 1e-3}, paper_millions=1.90),
+    "add": Contender("ADD", "mlp", "add", {"widths": (256, 256, 256, 256)}),
+    "mgcn": Contender("MGCN", "mgcn", "weds", basis_k=300, paper_millions=3.03),
+    "acscnn": Contender("ACSCNN", "acscnn", "acd_release", paper_millions=4.80),
+    "splinecnn": Contender("SplineCNN", "splinecnn", "constant", paper_millions=4.11),
+    "chebynet": Contender("ChebyNet", "chebynet", "constant"),
+    "mlp": Contender("ACD + MLP", "mlp", "acd_paper"),
+    "diffusionnet": Contender("DiffusionNet", "diffusionnet", "hks_diffusionnet"),
+}
+"""The methods of Tables 4 to 6, and today's reference, by the names of the rows of experiments."""
