@@ -37,10 +37,10 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     folder = Path(cfg.folder)
     rows: list[ResultRow] = []
     failures: list[str] = []
-    for name, overrides in cfg.rows.items():
+    for name, overrides in chosen_rows(cfg).items():
         for seed in cfg.seeds:
             try:
-                rows += Cells(cfg, str(name), list(overrides), int(seed), folder / str(name) / f"seed{seed}").fill()
+                rows += Cells(cfg, name, overrides, int(seed), folder / name / f"seed{seed}").fill()
             except CsmError as error:
                 failures.append(f"{name}, seed {seed}: {error}")
                 _log.error("%s", failures[-1])
@@ -53,6 +53,16 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     if failures:
         raise ConfigError(f"{len(failures)} rows of the matrix failed, the others are done:\n" + "\n".join(failures))
     return {f"age/{row.method}/{row.test}": row.age for row in table}
+
+
+def chosen_rows(cfg: DictConfig) -> dict[str, list[str]]:
+    """Return the rows to fill, name -> overrides of ``csm train``; ConfigError if `only` has another name."""
+    rows = {str(name): [str(text) for text in overrides] for name, overrides in cfg.rows.items()}
+    only = list(rows) if cfg.only is None else [str(name) for name in cfg.only]
+    unknown = [name for name in only if name not in rows]
+    if unknown:
+        raise ConfigError(f"matrix has no row {', '.join(unknown)}; it has {', '.join(rows)}")
+    return {name: rows[name] for name in only}
 
 
 class Cells:

@@ -53,6 +53,7 @@ def fit(cfg: DictConfig, datamodule: CorrespondenceDataModule, folder: Path) -> 
     begun = time.perf_counter()
     trainer.fit(module, datamodule=datamodule, ckpt_path=cfg.resume, weights_only=True)
     seconds = time.perf_counter() - begun
+    module.hparams["training"]["epochs"] = trainer.current_epoch  # fewer than asked for where max_time ended it
     checkpoint = folder / "model.ckpt"
     trainer.save_checkpoint(checkpoint)
     export_module(module, folder / "export")

@@ -168,6 +168,18 @@ def test_a_matrix_is_resumed_cell_by_cell(bench, monkeypatch):
     assert again.age == pytest.approx(table.age)
 
 
+def test_a_matrix_fills_only_the_rows_asked_for_and_ends_a_training_in_time(bench, capsys):
+    options = [*SMALL, "data.root=toys", "trainer.max_epochs=99999", "trainer.max_time='00:00:00:02'"]
+    rows = [f"+rows.{name}=[" + ",".join(f'"{x}"' for x in options) + "]" for name in ("one", "two")]
+    bench.run("matrix", "folder=timed", "only=[two]", *rows)
+    (row,) = read_rows(bench.folder / "timed/table.json")
+    assert row.method == "two"
+    assert 0 < row.epochs < 9999
+    with pytest.raises(SystemExit):
+        bench.run("matrix", "folder=timed", "only=[three]", *rows)
+    assert "no row three; it has one, two" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("by", ["descriptor=hks descriptor.k=40", "checkpoint=run/model.ckpt"])
 def test_two_meshes_are_matched_and_everything_is_written(bench, trained, by):
     out = by.partition("=")[0]
