@@ -7,7 +7,7 @@ import json
 import logging
 import sys
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +19,9 @@ from omegaconf import DictConfig, OmegaConf
 
 from csm.data.datamodule import CorrespondenceDataModule
 from csm.data.store import Store
-from csm.errors import ConfigError, CsmError
+from csm.errors import CsmError
+from csm.learning.meshes import stencils_for
 from csm.mesh.io import atomic_path
-from csm.networks import stencils_of
-from csm.operators.stencils import Stencil, stencil
 
 Run = Callable[[DictConfig], dict[str, Any]]
 
@@ -106,11 +105,3 @@ def make_datamodule(cfg: DictConfig) -> CorrespondenceDataModule:
         workers=cfg.workers,
     )
     return datamodule
-
-
-def stencils_for(network: Mapping[str, Any]) -> tuple[Stencil, ...]:
-    """Make the stencils that a network, given as its name and options, wants of every shape."""
-    try:
-        return tuple(stencil(name, **parameters) for name, parameters in stencils_of(**network).items())
-    except ValueError as error:
-        raise ConfigError(str(error)) from error

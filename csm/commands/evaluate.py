@@ -8,14 +8,14 @@ from typing import Any
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
-from csm.commands.app import command, output_folder, stencils_for
+from csm.commands.app import command, output_folder
 from csm.commands.report import conclude
 from csm.commands.testing import numbers, test_all
 from csm.data.datamodule import CorrespondenceDataModule
 from csm.data.store import Store
-from csm.descriptors import from_parameters
 from csm.errors import ConfigError
 from csm.learning.export import load_module
+from csm.learning.meshes import recipe_of
 from csm.learning.module import CSMModule
 
 
@@ -32,10 +32,11 @@ def run(cfg: DictConfig) -> dict[str, Any]:
 
 def datamodule_of(cfg: DictConfig, module: CSMModule) -> CorrespondenceDataModule:
     """Make the data module of the data group with the descriptor and basis of a trained module."""
+    recipe = recipe_of(module)
     datamodule: CorrespondenceDataModule = instantiate(cfg.data, _partial_=True)(
-        descriptor=from_parameters(**module.hparams["descriptor"]),
-        basis_k=module.hparams["basis_k"],
-        stencils=stencils_for(module.hparams["network"]),
+        descriptor=recipe.descriptor,
+        basis_k=recipe.basis_k,
+        stencils=recipe.stencils,
         store=Store(cfg.store),
         workers=cfg.workers,
     )

@@ -11,18 +11,14 @@ import torch
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
-from csm.commands.app import command, stencils_for, write_json
-from csm.data.datamodule import to_sample
-from csm.data.prepare import Recipe, compute_features, prepare_shape
-from csm.data.shapeset import Shape
+from csm.commands.app import command, write_json
+from csm.data.prepare import compute_features
 from csm.data.store import Store
-from csm.descriptors import Descriptor, from_parameters
 from csm.errors import ConfigError
 from csm.evaluation.matching import Match, match_features
 from csm.evaluation.provenance import provenance
 from csm.learning.export import load_module
-from csm.learning.module import CSMModule
-from csm.mesh.correspondence import PointMap
+from csm.learning.meshes import describe_mesh
 from csm.mesh.io import read_mesh, write_map, write_mesh
 from csm.mesh.shape import Mesh
 from csm.viewer.colors import position_colors, pull_colors
@@ -61,23 +57,15 @@ def match_files(cfg: DictConfig) -> Matched:
     source, target = read_mesh(cfg.source), read_mesh(cfg.target)
     store = Store(cfg.store)
     if cfg.checkpoint is None:
-        descriptor, module = instantiate(cfg.descriptor), None
+        descriptor = instantiate(cfg.descriptor)
         text = f"the descriptor {descriptor}"
+        rows = [torch.as_tensor(compute_features(mesh, descriptor, store)) for mesh in (source, target)]
     else:
         module = load_module(Path(cfg.checkpoint))
-        descriptor = from_parameters(**module.hparams["descriptor"])
         text = f"the learned descriptor of {Path(cfg.checkpoint).name}"
-    rows = [_describe(mesh, descriptor, module, store) for mesh in (source, target)]
+        rows = [describe_mesh(module, mesh, store) for mesh in (source, target)]
     match = match_features(*rows, source_name=source.name, target_name=target.name)
     return Matched(source, target, match, text)
-
-
-def _describe(mesh: Mesh, descriptor: Descriptor, module: CSMModule | None, store: Store) -> torch.Tensor:
-    if module is None:
-        return torch.as_tensor(compute_features(mesh, descriptor, store))
-    shape = Shape(mesh, PointMap.identity(mesh.n_vertices))
-    recipe = Recipe(descriptor, module.hparams["basis_k"], stencils_for(module.hparams["network"]))
-    return module.describe(to_sample(prepare_shape(shape, recipe, store)))
 
 
 def write_match(matched: Matched, folder: Path, seconds: float) -> None:

@@ -20,12 +20,11 @@ from csm.data.prepare import Recipe, prepare_shape
 from csm.data.shapeset import Shape
 from csm.data.store import Store
 from csm.descriptors.presets import preset
+from csm.learning.meshes import stencils_for
 from csm.learning.module import CSMModule
 from csm.mesh.correspondence import PointMap
 from csm.mesh.io import atomic_path
 from csm.mesh.shape import Mesh
-from csm.networks import stencils_of
-from csm.operators.stencils import stencil
 from csm.studies.contenders import Contender
 
 
@@ -91,8 +90,7 @@ def write_cost(path: Path, question: Mapping[str, Any], cost: Cost) -> None:
 
 
 def _recipe(contender: Contender) -> Recipe:
-    wanted = stencils_of(contender.network, **contender.options)
-    stencils = tuple(stencil(name, **parameters) for name, parameters in wanted.items())
+    stencils = stencils_for({"name": contender.network, **contender.options})
     return Recipe(preset(contender.descriptor), contender.basis_k, stencils)
 
 
