@@ -67,7 +67,7 @@ class Spectrum:
 def eigenpairs(stiffness: sparse.csr_array, mass: FloatArray, k: int, *, name: str = "mesh") -> Spectrum:
     """Return the `k` smallest eigenpairs of  S phi = lambda diag(mass) phi.
 
-    Shift-invert Lanczos with a fixed start vector on one BLAS thread, or a dense solver for small meshes.  The answer
+    Shift-invert block Lanczos from a fixed start on one BLAS thread, or a dense solver for small meshes.  The answer
     is accepted only if residuals and orthonormality hold and no eigenvalue was passed over (Sylvester's law of
     inertia: the signs of a factorisation count the eigenvalues below a bound).  Otherwise it is tried again, at most
     twice, which `Spectrum.notes` records.

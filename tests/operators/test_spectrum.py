@@ -52,6 +52,21 @@ def test_against_the_dense_generalised_problem(k):
     assert found.notes == ()
 
 
+def test_lanczos_finds_more_copies_of_an_eigenvalue_than_its_blocks_have_columns():
+    found = solve(pieces(*[sphere(2)] * 30), 40)  # 4,860 vertices, blocks of 4
+    assert found.n_zero() == 30
+    np.testing.assert_allclose(found.evals[30:], solve(sphere(2), 2).evals[1], rtol=1e-9)
+
+
+def test_lanczos_agrees_with_the_dense_solver_on_many_pairs():
+    matrix, mass = stiffness(blob(3)), vertex_areas(blob(3))
+    scale = 1 / np.sqrt(mass)
+    values, vectors = np.linalg.eigh(matrix.toarray() * scale[:, None] * scale)
+    found = eigenpairs(matrix, mass, 150)
+    np.testing.assert_allclose(found.evals[1:], values[1:150], rtol=1e-11)
+    np.testing.assert_allclose((found.evecs[:, :100] ** 2).sum(axis=1), (vectors[:, :100] ** 2).sum(axis=1) / mass)
+
+
 def test_a_small_mesh_gives_all_its_pairs():
     found = solve(sphere(1), 42)
     np.testing.assert_allclose(found.evecs.T @ (found.mass[:, None] * found.evecs), np.eye(42), atol=1e-10)
