@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from itertools import combinations_with_replacement
-from typing import Any, ClassVar, Literal, TypeAlias, get_args
+from typing import Any, ClassVar, Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, eigsh
 
 from csm._types import Float32Array, FloatArray
 from csm.descriptors.base import Features, as_operators
@@ -161,21 +160,48 @@ def cut_beyond(kernel: Float32Array, delta: float) -> None:
 
 def evolution(kernel: Float32Array, mass: FloatArray, c: float, terms: int) -> FloatArray:
     """Return (g - 1) / c, shape (N,), by `terms` steps of the series for  (1 - (c / rho) E) g = 1  with E = K Omega."""
-    step = mass / spectral_radius(kernel, mass)
-    gathered = np.zeros(len(mass))
-    wave = np.ones(len(mass))
+    space = powers_of_one(kernel, mass, terms)
+    step = space.process / space.radius
+    wave, gathered = space.one, np.zeros(len(space.one))
     for m in range(terms):
-        wave = _times(kernel, step * wave)
+        wave = step @ wave
         gathered += c**m * wave
-    return gathered
+    return space.basis @ gathered
 
 
-def spectral_radius(kernel: Float32Array, mass: FloatArray) -> float:
-    """Return the greatest eigenvalue of  K Omega,  from the symmetric matrix that is similar to it."""
-    root, n = np.sqrt(mass), len(mass)
-    symmetric = LinearOperator((n, n), matvec=lambda x: root * _times(kernel, root * x.ravel()), dtype=np.float64)
-    # The error of an eigenvalue goes with the square of the tolerance.
-    return float(eigsh(symmetric, 1, which="LA", v0=root, ncv=min(n, 10), tol=1e-4, return_eigenvectors=False)[0])
+class Krylov(NamedTuple):
+    """What  E = K Omega  makes of 1 again and again.
+
+    `basis` (N, S) spans 1, E 1, E^2 1, ... and is orthonormal with respect to Omega, `process` (S, S) is E and `one`
+    (S,) is 1 in it, and `radius` the spectral radius of E.
+    """
+
+    basis: FloatArray
+    process: FloatArray
+    one: FloatArray
+    radius: float
+
+
+def powers_of_one(kernel: Float32Array, mass: FloatArray, least: int) -> Krylov:
+    """Take Lanczos steps: more than `least`, until the space all but holds an eigenfunction of the spectral radius.
+
+    It ends before where there is nothing beyond it.
+    """
+    total = float(np.sqrt(mass.sum()))
+    basis, process = np.full((len(mass), 1), 1 / total), np.zeros((0, 0))
+    while True:
+        image = _times(kernel, mass * basis[:, -1])
+        column = basis.T @ (mass * image)
+        image -= basis @ column
+        image -= basis @ (basis.T @ (mass * image))  # zero but for rounding
+        process = np.block([[process, column[:-1, None]], [column[None]]])
+        beyond = float(np.sqrt(mass @ image**2))
+        evals, evecs = np.linalg.eigh(process)
+        # The error of an eigenvalue goes with the square of what its eigenfunction lacks.
+        found = len(column) > least and beyond * abs(evecs[-1, -1]) <= 1e-4 * evals[-1]
+        if found or beyond <= 1e-6 * evals[-1]:  # of single precision
+            return Krylov(basis, process, total * np.eye(len(column))[0], float(evals[-1]))
+        basis = np.column_stack([basis, image / beyond])
 
 
 def unit_range(values: FloatArray) -> FloatArray:

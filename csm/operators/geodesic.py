@@ -203,13 +203,21 @@ class _Heat(_OnMesh):
 class _Edge(_OnMesh):
     method = "edge"
 
+    def rows(self, sources: IntArray) -> FloatArray:
+        sources = self._checked(sources)
+        out = np.full((len(sources), self.mesh.n_vertices), np.inf)
+        out[np.arange(len(sources)), sources] = 0.0
+        at = self.local[sources]
+        out[np.ix_(at >= 0, self.used)] = dijkstra(self.graph, indices=at[at >= 0])
+        return out
+
     def _reach(self, source: int, targets: IntArray) -> FloatArray:
         straight = np.linalg.norm(self.vertices[targets] - self.vertices[source], axis=1).max()
         near = self._dijkstra(source, limit=2.0 * float(straight))[targets]
         return near if np.isfinite(near).all() else self._dijkstra(source, limit=np.inf)[targets]
 
     def _dijkstra(self, source: int, limit: float) -> FloatArray:
-        row: FloatArray = dijkstra(self.graph, directed=False, indices=np.array([source]), limit=limit)[0]
+        row: FloatArray = dijkstra(self.graph, indices=np.array([source]), limit=limit)[0]
         return row
 
 
@@ -219,7 +227,9 @@ def _edge_graph(vertices: FloatArray, faces: IntArray) -> csr_array:
     lengths = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
     # A stored zero would vanish from the graph, so coincident neighbours get the smallest positive length instead.
     lengths = np.maximum(lengths, np.finfo(np.float64).tiny)
-    return coo_array((lengths, (edges[:, 0], edges[:, 1])), shape=(len(vertices), len(vertices))).tocsr()
+    both = np.concatenate([edges, edges[:, ::-1]])  # a graph of one direction would be mirrored for every source
+    n = len(vertices)
+    return coo_array((np.tile(lengths, 2), (both[:, 0], both[:, 1])), shape=(n, n)).tocsr()
 
 
 def _require_window_propagation(mesh: Mesh) -> None:
