@@ -15,6 +15,7 @@ from csm.operators.bundle import Operators
 from csm.operators.filters import filter_names, mexican_hat_filters
 
 _BLOCK = 256  # columns of the N x N wavelets that are held at a time
+_NEGLIGIBLE = 1e-9  # of a filter's greatest value: float32 would not feel it, but denormal numbers are slow
 
 
 @dataclass(frozen=True)
@@ -147,10 +148,11 @@ def aggregate(evecs: FloatArray, filters: FloatArray, energies: FloatArray) -> F
     basis, responses = (_largest_one(a, axis) for a, axis in ((evecs, None), (filters, 0)))
     gathered = _largest_one(energies, 0)
     for r, response in enumerate(responses.T):
-        filtered = basis * response
+        felt = response > _NEGLIGIBLE
+        passed, filtered = basis[:, felt], basis[:, felt] * response[felt]
         for start in range(0, n, _BLOCK):
             rows = slice(start, start + _BLOCK)
-            squares = (basis[rows] @ filtered.T) ** 2
+            squares = (passed[rows] @ filtered.T) ** 2
             norm = np.linalg.norm(squares, axis=1, keepdims=True)
             values[rows, r] = (squares @ gathered) / np.where(norm > 0, norm, 1.0)
     restored: FloatArray = values * energies.max(axis=0)
