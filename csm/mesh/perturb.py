@@ -1,0 +1,135 @@
+"""Damage a mesh on purpose: noise, missing parts, and surfaces that have grown together where they come near."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.spatial.distance import cdist
+
+from csm._types import IntArray
+from csm.errors import MeshError
+from csm.mesh.shape import Mesh
+
+
+@dataclass(frozen=True, eq=False)
+class Damaged:
+    """A damaged mesh, and for each of its vertices the number that it has on the original, shape (N',)."""
+
+    mesh: Mesh
+    kept: IntArray
+
+
+def with_noise(mesh: Mesh, strength: float, seed: int = 0) -> Damaged:
+    """Move every vertex by a Gaussian vector.
+
+    Parameters
+    ----------
+    strength
+        Standard deviation of each coordinate, in mean edge lengths.
+    seed
+        Of the draw.
+    """
+    lengths = np.linalg.norm(np.diff(mesh.corners[:, [0, 1, 2, 0]], axis=1), axis=2)
+    shift = np.random.default_rng(seed).standard_normal(mesh.vertices.shape)
+    moved = mesh.vertices + strength * lengths.mean() * shift
+    return Damaged(Mesh(moved, mesh.faces, mesh.name), np.arange(mesh.n_vertices))
+
+
+def without_part(mesh: Mesh, centre: int, fraction: float) -> Damaged:
+    """Cut away the part around a vertex; of what is left the largest component is kept.
+
+    Parameters
+    ----------
+    centre
+        The vertex in the middle of what is cut away.
+    fraction
+        How much of the area that is: the faces whose corners are all among the vertices nearest to `centre` along
+        edges, until their share of the area is reached.
+
+    Raises
+    ------
+    MeshError
+        If nothing would be left.
+    """
+    distance = np.asarray(dijkstra(_edge_lengths(mesh), directed=False, indices=[centre]))[0]
+    reach = distance[mesh.faces].max(axis=1)
+    order = np.argsort(reach, kind="stable")
+    cut = order[np.cumsum(mesh.face_areas[order]) <= fraction * mesh.area]
+    faces = np.delete(mesh.faces, cut, axis=0)
+    if len(faces) == 0:
+        raise MeshError(f"{mesh.name}: cutting {fraction:g} of the area away leaves nothing")
+    return _largest_component(mesh, faces)
+
+
+def grown_together(mesh: Mesh, far: float = 0.5) -> Damaged:
+    """Join the surface with itself by a bridge where it comes nearest to itself, as scanners do with touching limbs.
+
+    One face at either end gives way to a tube of six; vertices stay, and a closed surface gets one more handle.
+
+    Parameters
+    ----------
+    far
+        How long the way along the surface must at least be between the two ends, in units of sqrt(area).
+
+    Raises
+    ------
+    MeshError
+        If no two points are that far apart.
+    """
+    first, second = _contact(mesh, far * np.sqrt(mesh.area))
+    a, b = mesh.faces[first], mesh.faces[second][::-1]
+    b = min((np.roll(b, k) for k in range(3)), key=lambda turned: _gap(mesh, a, turned))
+    tube = [[(a[i], a[(i + 1) % 3], b[(i + 1) % 3]), (a[i], b[(i + 1) % 3], b[i])] for i in range(3)]
+    faces = np.concatenate([np.delete(mesh.faces, [first, second], axis=0), np.reshape(tube, (6, 3))])
+    return Damaged(Mesh(mesh.vertices, faces, mesh.name), np.arange(mesh.n_vertices))
+
+
+def _edge_lengths(mesh: Mesh) -> csr_array:
+    """Return the edge graph, (N, N), each edge once with its length."""
+    begin, end = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
+    length = np.linalg.norm(mesh.vertices[begin] - mesh.vertices[end], axis=1)
+    ends, first = np.unique(np.sort(np.stack([begin, end]), axis=0), axis=1, return_index=True)
+    return csr_array((length[first], (ends[0], ends[1])), shape=(mesh.n_vertices,) * 2)
+
+
+def _largest_component(mesh: Mesh, faces: IntArray) -> Damaged:
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
+    graph = csr_array((np.ones(len(edges)), edges.T), shape=(mesh.n_vertices,) * 2)
+    label = connected_components(graph, directed=False)[1]
+    areas = np.bincount(label[faces[:, 0]], Mesh(mesh.vertices, faces, mesh.name).face_areas)
+    faces = faces[label[faces[:, 0]] == areas.argmax()]
+    kept, inverse = np.unique(faces, return_inverse=True)
+    return Damaged(Mesh(mesh.vertices[kept], inverse.reshape(-1, 3), mesh.name), kept)
+
+
+def _contact(mesh: Mesh, far: float) -> tuple[int, int]:
+    """Return two faces, near in space and `far` along the surface: the best of a sample, then the best around it."""
+    graph = _edge_lengths(mesh)
+    sample = np.unique(np.linspace(0, mesh.n_vertices - 1, 400).astype(np.int64))
+    for _ in range(2):
+        begin, end = _nearest_of_far(mesh, graph, sample, far)
+        gaps = np.linalg.norm(mesh.vertices - mesh.vertices[begin], axis=1)
+        sample = np.argsort(gaps, kind="stable")[:400]
+    first = np.flatnonzero((mesh.faces == begin).any(axis=1))
+    second = np.flatnonzero((mesh.faces == end).any(axis=1))
+    middles = mesh.corners.mean(axis=1)
+    between = np.linalg.norm(middles[first][:, None] - middles[second], axis=2)
+    i, j = np.unravel_index(between.argmin(), between.shape)
+    return int(first[i]), int(second[j])
+
+
+def _nearest_of_far(mesh: Mesh, graph: csr_array, sample: IntArray, far: float) -> tuple[int, int]:
+    way = np.asarray(dijkstra(graph, directed=False, indices=sample))
+    gaps = cdist(mesh.vertices[sample], mesh.vertices)
+    gaps[~((way >= far) & np.isfinite(way))] = np.inf
+    if np.isinf(gaps).all():
+        raise MeshError(f"{mesh.name}: no two points are {far:g} apart along the surface; ask for less")
+    i, end = np.unravel_index(gaps.argmin(), gaps.shape)
+    return int(sample[i]), int(end)
+
+
+def _gap(mesh: Mesh, a: IntArray, b: IntArray) -> float:
+    return float(np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1).sum())
