@@ -32,6 +32,8 @@ STUDIES: Mapping[str, Study] = {
     "figure4": Study("share of points within an error, all descriptors", "csm.studies.figure4"),
     "figure5": Study("pictures of descriptor distances on one body", "csm.studies.figure5"),
     "figure6": Study("pictures of descriptor distances across bodies", "csm.studies.figure6"),
+    "figure12": Study("errors over noise of the vertices", "csm.studies.figure12"),
+    "figure13": Study("errors with parts cut away or grown together", "csm.studies.figure13"),
     "stability": Study("change of all descriptors across resolutions of one body", "csm.studies.stability"),
 }
 """Every study; a new one is one line here and, if it has options, a section of conf/reproduce.yaml."""
