@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import inspect
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from omegaconf import DictConfig, OmegaConf
 
 from csm.commands.app import command
+from csm.commands.learned import PURPOSES
+from csm.commands.learned import make as make_learned
 from csm.data.prepare import processes
 from csm.data.store import Store
 from csm.errors import ConfigError
@@ -19,13 +22,18 @@ from csm.mesh.io import copy_file
 from csm.studies.registry import listing, study
 from csm.studies.study import Context, Findings, write_findings
 
-OmegaConf.register_new_resolver("studies", listing, replace=True)
+
+def _listing() -> str:
+    return "\n".join([listing(), *(f"  {name:<10}{purpose}" for name, purpose in PURPOSES.items())])
+
+
+OmegaConf.register_new_resolver("studies", _listing, replace=True)
 
 
 def run(cfg: DictConfig) -> dict[str, Any]:
     """Make every study of ``targets``, one after the other."""
     if not cfg.targets:
-        raise ConfigError(f"reproduce needs names of studies, such as csm reproduce table1; there are\n{listing()}")
+        raise ConfigError(f"reproduce needs names of studies, such as csm reproduce table1; there are\n{_listing()}")
     return make_studies(cfg, [str(name) for name in cfg.targets])
 
 
@@ -37,19 +45,25 @@ def make_studies(cfg: DictConfig, names: Sequence[str]) -> dict[str, Any]:
     ConfigError
         If a study or one of its options is unknown, before any is begun.
     """
-    wanted = [(name, study(name).load(), options_of(cfg, name)) for name in dict.fromkeys(names)]
     context = Context(
         Path(cfg.data.root), Path(cfg.out), Store(cfg.store), processes(cfg.workers, n_jobs=3), int(cfg.seed)
     )
+    wanted = {name: _maker(cfg, context, name) for name in names}
     context.out.mkdir(parents=True, exist_ok=True)
     taken: dict[str, Any] = {}
-    for name, make, options in wanted:
+    for name, make in wanted.items():
         begun = time.perf_counter()
-        findings = make(context, **options)
+        findings = make()
         seconds = time.perf_counter() - begun
         conclude(findings, context.out, cfg.results, seconds)
         taken[f"seconds/{name}"] = round(seconds, 1)
     return taken
+
+
+def _maker(cfg: DictConfig, context: Context, name: str) -> Callable[[], Findings]:
+    if name in PURPOSES:
+        return partial(make_learned, cfg, context, name)
+    return partial(study(name).load(), context, **options_of(cfg, name))
 
 
 def options_of(cfg: DictConfig, name: str) -> dict[str, Any]:

@@ -180,6 +180,23 @@ def test_a_matrix_fills_only_the_rows_asked_for_and_ends_a_training_in_time(benc
     assert "no row three; it has one, two" in capsys.readouterr().err
 
 
+def test_a_table_of_learned_methods_is_reproduced_from_its_matrix(bench):
+    row = "+rows.toy=[" + ",".join(f"'{x}'" for x in (*SMALL, "data.root=toys", "trainer.max_epochs=2")) + "]"
+    overrides = OmegaConf.create([row, "only=[toy]", "seeds=[0,1]"])
+    bench.run(
+        "reproduce",
+        "targets=[table4]",
+        f"table4.overrides={OmegaConf.to_object(overrides)!r}",
+        "out=made",
+        "results=shown",
+    )
+    record = bench.json("shown/table4.json")
+    assert [line["method"] for line in record["rows"]] == ["toy", "toy, argmax"]
+    assert record["rows"][0]["seeds"] == "0 1"
+    assert record["rows"][0]["toys paper"] is None
+    assert (bench.folder / "shown/figure7_toys.png").exists()
+
+
 @pytest.mark.parametrize("by", ["descriptor=hks descriptor.k=40", "checkpoint=run/model.ckpt"])
 def test_two_meshes_are_matched_and_everything_is_written(bench, trained, by):
     out = by.partition("=")[0]
