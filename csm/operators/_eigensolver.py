@@ -49,8 +49,8 @@ def attempts(problem: Problem) -> tuple[Attempt, ...]:
     block = min(max(k // 10, 2), 8)
     return (
         Attempt("shift-invert", shift, block),
-        Attempt("shift-invert in a larger space", shift, 2 * block),
-        Attempt("shift-invert with a larger shift", 10 * shift, 2 * block),
+        Attempt("shift-invert in a larger space", shift, block + 8),
+        Attempt("shift-invert with a larger shift", 10 * shift, block + 8),
     )
 
 
@@ -67,7 +67,9 @@ def attempt_once(problem: Problem, attempt: Attempt) -> tuple[Pairs | None, str]
 def _factor(symmetric: sparse.csc_array, shift: float) -> SuperLU:
     """Factor  symmetric - shift I  with diagonal pivots: U's diagonal has a negative entry per eigenvalue below."""
     shifted = sparse.csc_array(symmetric - shift * sparse.eye_array(symmetric.shape[0]))
-    return splu(shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    return splu(
+        shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=4, options={"SymmetricMode": True}
+    )
 
 
 def _solve(problem: Problem, attempt: Attempt) -> Pairs:
@@ -89,7 +91,7 @@ def _lanczos(operator: Callable[[FloatArray], FloatArray], n: int, k: int, block
     basis = np.empty((n, limit + block), order="F")  # room that is not used is never touched
     reduced = np.zeros((limit + block, limit + block))  # the operator in the basis, lower half, block tridiagonal
     basis[:, :block] = np.linalg.qr(np.random.default_rng(0).standard_normal((n, block)))[0]
-    look = 2.5 * k + 16 * block  # where meshes are about to converge
+    look = 2.5 * k + 17 * block - 10  # where meshes are about to converge
     for size in range(block, limit + 1, block):
         _step(operator, basis[:, : size + block], reduced, block)
         if size >= min(look, limit):
@@ -105,14 +107,13 @@ def _lanczos(operator: Callable[[FloatArray], FloatArray], n: int, k: int, block
 def _step(operator: Callable[[FloatArray], FloatArray], basis: FloatArray, reduced: FloatArray, block: int) -> None:
     """Fill the last `block` columns of the basis, and those of `reduced` that belong to the block before."""
     size = basis.shape[1] - block
-    before, here, after = (slice(max(start, 0), start + block) for start in (size - 2 * block, size - block, size))
-    known, last = basis[:, :size], basis[:, here]
-    image = operator(last)
-    if size > block:
-        image -= basis[:, before] @ reduced[here, before].T
-    reduced[here, here] = last.T @ image
-    image -= last @ reduced[here, here]
+    here, after = slice(size - block, size), slice(size, size + block)
+    known, recent = basis[:, :size], basis[:, max(size - 2 * block, 0) : size]
+    image = operator(basis[:, here])
+    along = recent.T @ image
+    image -= recent @ along
     image -= known @ (known.T @ image)  # zero but for rounding, which would grow
+    reduced[here, here] = along[-block:]
     basis[:, after], reduced[after, here] = np.linalg.qr(image)
 
 
