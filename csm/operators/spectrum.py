@@ -16,6 +16,8 @@ from csm.operators._eigensolver import Problem, attempt_once, attempts, residual
 
 _log = logging.getLogger(__name__)
 
+_ZERO = 1e-8  # eigenvalues below this over the area are zero but for rounding
+
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
@@ -24,7 +26,8 @@ class Spectrum:
     Attributes
     ----------
     evals
-        Shape (K,), ascending, at least 0; in units of 1/area (the inverse square of the mesh's unit of length).
+        Shape (K,), ascending, at least 0, and exactly 0 for functions that are constant on components; in units of
+        1/area (the inverse square of the mesh's unit of length).
     evecs
         Shape (N, K), orthonormal with respect to `mass`; of each, the first entry of greatest magnitude is positive.
     mass
@@ -56,7 +59,7 @@ class Spectrum:
         NumericalError
             If all are zero, because the mesh has at least K components; ask for more pairs.
         """
-        count = int(np.searchsorted(self.evals, 1e-8 / self.mass.sum()))
+        count = int(np.searchsorted(self.evals, _ZERO / self.mass.sum()))
         if count == len(self.evals):
             raise NumericalError(
                 f"all {count} eigenvalues are zero, one per component of the mesh; ask for more of them"
@@ -100,8 +103,9 @@ def eigenpairs(stiffness: sparse.csr_array, mass: FloatArray, k: int, *, name: s
         for attempt in attempts(problem):
             found, fault = attempt_once(problem, attempt)
             if found is not None:
+                evals = np.where(found.evals < _ZERO * problem.unit, 0.0, found.evals)
                 evecs = _with_fixed_signs(scale[:, None] * found.evecs)
-                return Spectrum(np.maximum(found.evals, 0.0), evecs, mass, residual(problem, found), tuple(notes))
+                return Spectrum(evals, evecs, mass, residual(problem, found), tuple(notes))
             notes.append(f"{k} eigenpairs by {attempt.method}: {fault}")
             _log.warning("%s: %s", name, notes[-1])
     raise NumericalError(f"{name}: no attempt gave sound eigenpairs ({'; '.join(notes)}); run `csm check` on the mesh")
