@@ -51,7 +51,7 @@ class MGCN(nn.Module):
         descriptor_channels: int = 256,
         ks: int = 300,
         filters: int = 32,
-        tolerance: float = 3e-3,
+        tolerance: float = 1e-3,
         products: Products = "float32",
         dropout: float = 0.5,
     ) -> None:
@@ -66,7 +66,7 @@ class MGCN(nn.Module):
         self.classifier = nn.Linear(descriptor_channels, n_classes)
 
     @staticmethod
-    def stencils(ks: int = 300, filters: int = 32, tolerance: float = 3e-3, **_: Any) -> dict[str, dict[str, Any]]:
+    def stencils(ks: int = 300, filters: int = 32, tolerance: float = 1e-3, **_: Any) -> dict[str, dict[str, Any]]:
         """Return what the network wants to know of a shape: the wavelets."""
         return {"wavelets": {"k": ks, "n_filters": filters, "tolerance": tolerance}}
 

@@ -20,13 +20,15 @@ HELD_BYTES = 3e9
 class Patch(NamedTuple):
     """A patch of vertices, those that its wavelets reach, and per wavelet the kernel's fourth powers between them.
 
-    Shapes: `rows` (R,), `columns` (Q,), of each power (R, Q_s) for the first Q_s columns, `sums` (R, S) along these.
+    Shapes: `rows` (R,), `columns` (Q,), of each power (R, Q_s) for the first Q_s columns; `scales` (R, S) make their
+    weights in an average, and `dropped` (R, S) is what is left to the mean of all vertices.
     """
 
     rows: Tensor
     columns: Tensor
     powers: list[Tensor]
-    sums: Tensor
+    scales: Tensor
+    dropped: Tensor
 
 
 class WaveletOperators:
@@ -47,6 +49,7 @@ class WaveletOperators:
         self._evecs, self._responses = stencil["evecs"].to(dtype), stencil["responses"].to(dtype)
         self._used = [int(response.count_nonzero()) for response in self._responses.T]  # they end in zeros
         self._rows, self._columns = _split(stencil, "row"), _split(stencil, "column")
+        self._dropped = torch.split(stencil["dropped"].to(dtype), [len(rows) for rows in self._rows])
         self._extents: list[list[int]] = stencil["extents"].tolist()
         self.dtype = torch.bfloat16 if products == "bfloat16" else dtype
         self._held = list(self._make()) if self.n_bytes <= HELD_BYTES else None
@@ -67,11 +70,12 @@ class WaveletOperators:
         return self._make() if self._held is None else iter(self._held)
 
     def _make(self) -> Iterator[Patch]:
-        for rows, columns, extents in zip(self._rows, self._columns, self._extents, strict=True):
+        parts = zip(self._rows, self._columns, self._extents, self._dropped, strict=True)
+        for rows, columns, extents, dropped in parts:
             near, far = self._evecs[rows], self._evecs[columns]
             powers = [self._powers(s, near, far[:extent]) for s, extent in enumerate(extents)]
             sums = torch.stack([p.sum(1, dtype=self._evecs.dtype) for p in powers], 1)
-            yield Patch(rows, columns, powers, sums.clamp_min(torch.finfo(sums.dtype).tiny))
+            yield Patch(rows, columns, powers, (1 - dropped) / sums.clamp_min(torch.finfo(sums.dtype).tiny), dropped)
 
     def _powers(self, s: int, near: Tensor, far: Tensor) -> Tensor:
         used = self._used[s]
@@ -80,7 +84,10 @@ class WaveletOperators:
         return squares.square_().to(self.dtype)
 
     def averages(self, x: Tensor) -> Tensor:
-        """Return G_s^T x, shape (N, S, C), of the functions `x`, shape (N, C): averages that a wavelet weights."""
+        """Return G_s^T x, shape (N, S, C), of the functions `x`, shape (N, C): averages that a wavelet weights.
+
+        For what the stencil dropped of the weights, the mean of all vertices is taken.
+        """
         y: Tensor = _Averages.apply(x, self)  # type: ignore[no-untyped-call]
         return y
 
@@ -92,11 +99,11 @@ class _Averages(torch.autograd.Function):
     def forward(ctx: Any, x: Tensor, operators: WaveletOperators) -> Tensor:
         ctx.operators = operators
         y = x.new_empty(x.shape[0], operators.n_wavelets, x.shape[1])
-        rounded = x.to(operators.dtype)
+        rounded, mean = x.to(operators.dtype), x.mean(0)
         for patch in operators:
             seen = rounded[patch.columns]
             sums = torch.stack([p @ seen[: p.shape[1]] for p in patch.powers], 1)
-            y[patch.rows] = sums / patch.sums[:, :, None]
+            y[patch.rows] = sums * patch.scales[:, :, None] + patch.dropped[:, :, None] * mean
         return y
 
     @staticmethod
@@ -104,13 +111,18 @@ class _Averages(torch.autograd.Function):
     def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, None]:
         operators: WaveletOperators = ctx.operators
         back = grad.new_zeros(grad.shape[0], grad.shape[2])
+        to_mean = grad.new_zeros(grad.shape[2])
         for patch in operators:
-            share = (grad[patch.rows] / patch.sums[:, :, None]).to(operators.dtype)
+            arriving = grad[patch.rows]
+            to_mean += (arriving * patch.dropped[:, :, None]).sum((0, 1))
+            scaled = (arriving * patch.scales[:, :, None]).transpose(0, 1).to(operators.dtype).contiguous()
             seen = grad.new_zeros(len(patch.columns), grad.shape[2])
-            for s, power in enumerate(patch.powers):
-                seen[: power.shape[1]] += power.T @ share[:, s]
+            buffer = torch.empty_like(seen, dtype=operators.dtype)  # fresh memory for every product is slow
+            for power, part in zip(patch.powers, scaled, strict=True):
+                n = power.shape[1]
+                seen[:n] += torch.mm(power.T, part, out=buffer[:n])
             back.index_add_(0, patch.columns, seen)
-        return back, None
+        return back + to_mean / len(back), None
 
 
 class MGConv(nn.Module):

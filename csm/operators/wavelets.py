@@ -14,6 +14,7 @@ from csm.operators.bundle import Operators
 from csm.operators.filters import mexican_hat_filters
 
 _NEGLIGIBLE = 1e-9  # of a filter's greatest value: float32 would not feel it, but denormal numbers are slow
+_GRAIN = 128  # that counts of vertices are rounded up to: matrix kernels are generated once for every size that occurs
 _LEVELS = 160  # of size, four per octave: weights down to 2^-40 are told apart
 
 
@@ -32,7 +33,8 @@ class Wavelets:
     Sixteen N x N matrices are too much to keep, so the arrays say how to make the entries that matter: the factors of
     the kernel, a partition of the vertices into patches, and for every patch and wavelet a set of vertices outside of
     which no column of the patch has more than `tolerance` of its sum.  Sets of a patch are nested from the smallest to
-    the greatest, so that each is a first part of one list.
+    the greatest, so that each is a first part of one list.  What each column has outside, its `dropped` share, comes
+    along, so that a network can let the average over all vertices stand for it.
 
     Parameters
     ----------
@@ -59,7 +61,7 @@ class Wavelets:
 
     k: int = 300
     n_filters: int = 32
-    tolerance: float = 3e-3
+    tolerance: float = 1e-3
     patch: int = 100
 
     name: ClassVar[str] = "wavelets"
@@ -73,7 +75,8 @@ class Wavelets:
 
         `evecs` (N, K) and `responses` (K, S), with which the greatest value of every kernel is 1; `rows` (N,) the
         vertices patch by patch and `row_ends` (B,) where each patch ends in it; `columns` and `column_ends` (B,) the
-        same for the vertices that a patch reaches; `extents` (B, S) how many of these each wavelet uses.
+        same for the vertices that a patch reaches; `extents` (B, S) how many of these each wavelet uses; `dropped`
+        (N, S), in the order of `rows`, what this leaves out of the column's sum 1.
         """
         spectrum = operators.lbo(self.k + 1)
         kept = slice(spectrum.n_zero(), None)
@@ -92,6 +95,7 @@ class Wavelets:
             "columns": np.concatenate([r.columns for r in reaches]),
             "column_ends": np.cumsum([len(r.columns) for r in reaches]),
             "extents": np.array([r.extents for r in reaches]),
+            "dropped": np.concatenate([r.dropped for r in reaches]),
         }
 
     def parameters(self) -> dict[str, Any]:
@@ -100,10 +104,15 @@ class Wavelets:
 
 
 class Reach(NamedTuple):
-    """The vertices that a patch reaches, `columns`, and how many of the first of them each wavelet uses, (S,)."""
+    """What a patch of R vertices reaches.
+
+    Shapes: `columns` (Q,) vertices, `extents` (S,) how many of the first of them each wavelet uses, `dropped` (R, S)
+    what this leaves out of each column's sum 1.
+    """
 
     columns: IntArray
     extents: IntArray
+    dropped: Float32Array
 
 
 def partition(embedding: FloatArray, size: int) -> list[IntArray]:
@@ -142,13 +151,16 @@ def reach(evecs: Float32Array, responses: Float32Array, patch: IntArray, toleran
     tolerance
         As of `Wavelets`.
     """
-    kept = np.array([substantial(fourth_powers(evecs, response, patch), tolerance) for response in responses.T])
+    weights = [fourth_powers(evecs, response, patch) for response in responses.T]
+    kept = np.array([substantial(w, tolerance) for w in weights])
     order = np.argsort(kept.sum(axis=1), kind="stable")
     nested = np.logical_or.accumulate(kept[order], axis=0)
     first = (~nested).sum(axis=0)  # the first of the nested sets that has the vertex
     extents = np.empty(len(kept), dtype=np.int64)
-    extents[order] = nested.sum(axis=1)
-    return Reach(np.argsort(first, kind="stable")[: extents.max()], extents)
+    extents[order] = np.minimum(-(-nested.sum(axis=1) // _GRAIN) * _GRAIN, nested[-1].sum())
+    columns = np.argsort(first, kind="stable")[: extents.max()]
+    dropped = np.stack([1 - w[columns[:n]].sum(axis=0) for w, n in zip(weights, extents, strict=True)], axis=1)
+    return Reach(columns, extents, np.clip(dropped, 0, 1))
 
 
 def fourth_powers(evecs: Float32Array, response: Float32Array, patch: IntArray) -> Float32Array:

@@ -52,7 +52,7 @@ def test_size_of_the_input_features_does_not_matter(surface):
 
 
 def test_its_options_are_those_of_its_stencil():
-    assert stencils_of("mgcn") == {"wavelets": {"k": 300, "n_filters": 32, "tolerance": 3e-3}}
+    assert stencils_of("mgcn") == {"wavelets": {"k": 300, "n_filters": 32, "tolerance": 1e-3}}
     assert stencils_of("mgcn", ks=9, filters=6, tolerance=0.0, dropout=0.1)["wavelets"]["k"] == 9
     with pytest.raises(ValueError, match="bfloat16"):
         MGCN(3, 4, products="float16")  # type: ignore[arg-type]

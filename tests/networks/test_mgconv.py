@@ -20,8 +20,10 @@ def surface(**parameters) -> Surface:
     return surface_of(MESH, 2, {"wavelets": {**SMALL, "patch": 40, **parameters}})
 
 
-def operators(tolerance: float = 0.0, dtype: torch.dtype = torch.float64, **options) -> WaveletOperators:
-    return WaveletOperators(surface(tolerance=tolerance).stencil("wavelets"), dtype, **options)
+def operators(
+    tolerance: float = 0.0, dtype: torch.dtype = torch.float64, patch: int = 40, **options
+) -> WaveletOperators:
+    return WaveletOperators(surface(tolerance=tolerance, patch=patch).stencil("wavelets"), dtype, **options)
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +51,14 @@ def test_weights_sum_to_one(tolerance, products):
     ones = torch.ones(MESH.n_vertices, 2, dtype=torch.float64)
     averages = operators(tolerance, products=products).averages(ones)
     torch.testing.assert_close(averages, ones[:, None].expand(-1, 4, -1), rtol=4e-3, atol=0)
+
+
+@pytest.mark.parametrize("tolerance", [0.01, 0.1])
+def test_the_mean_stands_for_what_is_dropped(dense, tolerance):
+    """The error stays within the tolerance, and far within it as the mean is a fair guess."""
+    x = functions()
+    error = (operators(tolerance, patch=10).averages(x) - torch.einsum("snm,mc->nsc", dense, x)).abs().max()
+    assert 0 < error < 0.5 * tolerance
 
 
 def test_gradients_in_float64():
