@@ -90,7 +90,7 @@ def test_isotropic_needs_no_frame_and_is_one_block():
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"alpha": -1}, {"angles": 0}, {"k": 1}, {"order": -1}, {"alpha": float("nan")}, {"cuts": 0}, {"cuts": 9}]
+    "wrong", [{"alpha": -1}, {"angles": 0}, {"k": 1}, {"order": -1}, {"alpha": float("nan")}, {"cuts": 0}, {"cuts": 10}]
 )
 def test_settings_out_of_range_are_refused(wrong):
     with pytest.raises(ConfigError, match="wanted"):

@@ -10,6 +10,7 @@ import scipy.linalg
 from csm.errors import ConfigError, MeshError, NumericalError
 from csm.mesh.shape import Mesh
 from csm.operators import _eigensolver as solver
+from csm.operators.bundle import Operators
 from csm.operators.laplacian import stiffness, vertex_areas
 from csm.operators.spectrum import Spectrum, eigenpairs
 from tests.shapes import blob, plane, sphere, torus
@@ -116,6 +117,14 @@ def test_eigenvalues_go_with_the_inverse_area():
     big = solve(replace(mesh, vertices=1000 * mesh.vertices), 10)
     np.testing.assert_allclose(1e6 * big.evals, solve(mesh, 10).evals, rtol=1e-7, atol=1e-9)
     assert big.n_zero() == 1
+
+
+def test_slivers_do_not_spoil_the_residual():
+    mesh = blob(4)
+    vertices = mesh.vertices.copy()
+    a, b, c = mesh.faces[0]
+    vertices[a] = vertices[[b, c]].mean(axis=0) + 1e-6 * (vertices[a] - vertices[b])
+    assert Operators(Mesh(vertices, mesh.faces, "sliver")).lbo(100).residual < 5e-9
 
 
 def test_first_gives_the_smallest_pairs():
