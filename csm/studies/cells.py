@@ -188,4 +188,7 @@ def _kept(path: Path, question: Mapping[str, Any]) -> Cell | None:
     if cell.question != question:
         _log.warning("%s answers another question (descriptor, pairs or protocol); it is made again", path)
         return None
+    if cell.failures:
+        _log.info("%s lacks %s; they are tried again", path, ", ".join(cell.failures))
+        return None
     return cell
