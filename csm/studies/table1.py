@@ -169,8 +169,8 @@ def _notes(columns: Mapping[str, Column], wanted: Sequence[str]) -> tuple[str, .
     absent = [SETS[key].title for key in wanted if key not in columns]
     notes = [
         "Each cell has the mean error over all points of all pairs ± the standard deviation over pairs. Ranks are the "
-        "paper's / ours, each among the families of this table, of which ACD stands in two settings. Equal ranks of "
-        "the paper are ties.",
+        "paper's / ours, each among the families of this table, of which ACD stands in several settings. Equal ranks "
+        "of the paper are ties.",
         _distances_note(cells),
         *(column.note for column in columns.values()),
         "Assumed: what of a descriptor no source says, so that its row is our best guess at what was run; the "
