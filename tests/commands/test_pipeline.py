@@ -259,7 +259,9 @@ def test_errors_are_one_paragraph_and_status_2(bench, capsys, command, arguments
 
 
 def test_describe_writes_values_with_their_columns(bench):
-    bench.run("describe", "mesh=toys/toy0.off", "out=d.npz", "descriptor.angles=3", "descriptor.order=1")
+    bench.run(
+        "describe", "mesh=toys/toy0.off", "out=d.npz", "descriptor.angles=3", "descriptor.order=1", "descriptor.cuts=1"
+    )
     with np.load(bench.folder / "d.npz") as found:
         assert found["values"].shape == (162, 6)
         assert found["columns"][1] == "theta=0.000 T1"
