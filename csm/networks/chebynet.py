@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -11,6 +10,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from csm.networks.csmconv import reset_terms
 from csm.networks.sparse import chebyshev_filter
 from csm.networks.surface import Surface
 
@@ -109,10 +109,7 @@ class ChebConv(nn.Module):
 
     def reset_parameters(self) -> None:
         """Draw the weights Xavier-uniformly with the fan of all terms together, and set the bias to zero."""
-        terms, fan_in, fan_out = self.weight.shape
-        bound = math.sqrt(6.0 / (terms * (fan_in + fan_out)))
-        nn.init.uniform_(self.weight, -bound, bound)
-        nn.init.zeros_(self.bias)
+        reset_terms(self.weight, self.bias)
 
     def forward(self, x: Tensor, stencil: Mapping[str, Tensor]) -> Tensor:
         """Convolve the functions `x`, shape (N, C_in), with these arrays of `ScaledLaplacian`."""

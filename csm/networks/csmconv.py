@@ -34,6 +34,14 @@ def chebyshev(x: Tensor, terms: int) -> Tensor:
     return torch.stack(rows[:terms])
 
 
+def reset_terms(weight: Tensor, bias: Tensor) -> None:
+    """Draw a weight, shape (D, C_in, C_out), Xavier-uniformly with the fan of all terms together; set the bias to 0."""
+    terms, fan_in, fan_out = weight.shape
+    bound = math.sqrt(6.0 / (terms * (fan_in + fan_out)))
+    nn.init.uniform_(weight, -bound, bound)
+    nn.init.zeros_(bias)
+
+
 class CSMConv(nn.Module):
     r"""Chebyshev spectral manifold convolution (the paper's Eq. 11).
 
@@ -72,10 +80,7 @@ class CSMConv(nn.Module):
 
     def reset_parameters(self) -> None:
         """Draw the weights Xavier-uniformly with the fan of all terms together, and set the bias to zero."""
-        terms, fan_in, fan_out = self.weight.shape
-        bound = math.sqrt(6.0 / (terms * (fan_in + fan_out)))
-        nn.init.uniform_(self.weight, -bound, bound)
-        nn.init.zeros_(self.bias)
+        reset_terms(self.weight, self.bias)
 
     def filters(self, evals: Tensor) -> Tensor:
         """Return the learned spectral filters sum_d T_d(2 evals / evals[-1] - 1) W_d, shape (K, C_in, C_out)."""

@@ -5,6 +5,7 @@ Errors are measured on the target as it was, at the points that are left of it, 
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -82,7 +83,7 @@ def contestants(descriptors: Sequence[str], checkpoints: Mapping[str, str], stor
         If a checkpoint cannot be read.
     """
     if not descriptors and not checkpoints:
-        raise ConfigError("name a descriptor, or a checkpoint as +figureN.checkpoints.NAME=PATH")
+        raise ConfigError("name a descriptor, or a checkpoint as figure12.checkpoints={NAME:PATH}")
     found = {name: _descriptor(name, store) for name in descriptors}
     return found | {name: _network(Path(path), store) for name, path in checkpoints.items()}
 
@@ -118,6 +119,7 @@ def damage_rows(
         target = bodies.original.load(name)
         sources = [bodies.original.load(source) for source, other in pairs if other == name]
         for title, damage in damages.items():
+            once = functools.cache(damage)  # the same for every method, and not made where all is kept
             for method, contestant in methods.items():
                 question = {
                     "damage": title,
@@ -126,7 +128,7 @@ def damage_rows(
                     "plan": [plan.points, plan.distance, context.seed],
                 }
                 found[title, method].append(
-                    _kept(context.out / "damage", question, lambda: _measure(target, sources, damage, contestant, plan))  # noqa: B023
+                    _kept(context.out / "damage", question, lambda: _measure(target, sources, once, contestant, plan))  # noqa: B023
                 )
     return [{"damage": title, "method": method, **_summary(cells)} for (title, method), cells in found.items()]
 
