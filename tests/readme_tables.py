@@ -12,18 +12,14 @@ from pathlib import Path
 
 from csm.evaluation.report import ResultRow, read_rows
 from csm.evaluation.tables import Published, markdown_table, paper_table
+from csm.studies.published import LEARNED_AGE
 from csm.studies.study import Findings
 
 ROOT = Path(__file__).resolve().parent.parent
 BLOCK = re.compile(r"(<!-- (table|study): (\S+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
-TABLE4 = {"FAUST_6890": 0.010, "FAUST_10000": 0.015, "FAUST_15000": 0.017}
-"""Row CSMCNN of the paper's Table 4, as fractions of the diameter."""
-
-PUBLISHED: Published = {
-    **{(method, test): age for method in ("faust_paper", "faust_release") for test, age in TABLE4.items()},
-    ("scape_paper", "SCAPE_5000"): 0.022,  # the paper's Table 5
-}
+PUBLISHED: Published = {(m, test): age / 1000 for m, ages in LEARNED_AGE.items() for test, age in ages.items()}
+"""Tables 4 and 5 of the paper, as fractions of the diameter."""
 
 
 def tables(rows: list[ResultRow]) -> str:

@@ -1,11 +1,13 @@
 """``csm matrix``: train every row once per seed, test it on every test set, resumable cell by cell.
 
-The folder holds, per row and seed, ``model.ckpt`` and one json per test set.  What is there is not made again, so a
-killed matrix is started again with the same command; a training goes on from its last epoch.
+The folder holds, per row and seed, ``model.ckpt``, how it was trained (``row.json``) and one json per test set.  What
+is there is not made again, so a killed matrix is started again with the same command; a training goes on from its last
+epoch.  Matrices with a folder in common share the rows that have the same name.
 """
 
 from __future__ import annotations
 
+import json
 import logging
 from collections.abc import Sequence
 from functools import cached_property
@@ -13,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from hydra import compose
-from omegaconf import DictConfig, open_dict
+from omegaconf import DictConfig, OmegaConf, open_dict
 
-from csm.commands.app import command, make_datamodule
+from csm.commands.app import command, make_datamodule, write_json
 from csm.commands.testing import Matching, protocol_of, test_on
 from csm.commands.train import fit
 from csm.data.datamodule import CorrespondenceDataModule
@@ -26,6 +28,7 @@ from csm.learning.export import load_module
 from csm.learning.module import CSMModule
 
 _log = logging.getLogger(__name__)
+_PLACES = ("root", "test", "test_roots")
 
 
 def run(cfg: DictConfig) -> dict[str, Any]:
@@ -46,7 +49,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
                 _log.error("%s", failures[-1])
     table = average_seeds(rows)
     if table:
-        write_rows(folder / "table.json", table)
+        write_rows(folder / f"{cfg.table}.json", table)
         print(markdown_table(table))
     if cfg.results and table:
         add_rows(cfg.results, table)
@@ -106,8 +109,32 @@ class Cells:
             return load_module(checkpoint)
         return fit(self.train_cfg, self.datamodule, self.folder)[0]
 
+    def require_same_training(self) -> None:
+        """Keep how the row is trained, or refuse what the folder holds if it was trained otherwise.
+
+        Raises
+        ------
+        ConfigError
+            With the entries that differ.
+        """
+        path, wanted = self.folder / "row.json", training_of(self.train_cfg)
+        if path.exists():
+            kept = json.loads(path.read_text(encoding="utf-8"))
+            changed = [
+                f"{key}: {kept.get(key)} there, {wanted.get(key)} wanted"
+                for key in sorted({*kept, *wanted})
+                if kept.get(key) != wanted.get(key)
+            ]
+            if changed:
+                raise ConfigError(
+                    f"{self.folder} was trained otherwise ({'; '.join(changed)}); call the row otherwise, choose "
+                    "another folder=, or remove that one"
+                )
+        write_json(path, wanted)
+
     def fill(self) -> list[ResultRow]:
         """Return the row of every test set, from its file where that answers the same question."""
+        self.require_same_training()
         return [self._cell(name, matching) for matching in self.matchings for name in self.datamodule.test_sets]
 
     def _cell(self, test: str, matching: Matching) -> ResultRow:
@@ -123,6 +150,17 @@ class Cells:
         write_rows(path, [tested.row])
         write_curves_csv(path.with_suffix(".cqc.csv"), {test: tested.evaluation})
         return tested.row
+
+
+def training_of(cfg: DictConfig) -> dict[str, Any]:
+    """Return what a training depends on, flat: seed, data without their place and test sets, network, optimisation."""
+    plain: Any = OmegaConf.to_container(cfg, resolve=True)
+    found: dict[str, Any] = {"seed": plain["seed"]}
+    for group in ("data", "descriptor", "model", "optimizer"):
+        found |= {f"{group}.{key}": value for key, value in plain[group].items() if key not in _PLACES}
+    if found.get("data.split"):
+        found["data.split"] = Path(found["data.split"]).name
+    return found | {f"trainer.{key}": plain["trainer"][key] for key in ("max_epochs", "max_time")}
 
 
 main = command("matrix")(run)

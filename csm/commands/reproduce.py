@@ -12,7 +12,7 @@ from typing import Any
 from omegaconf import DictConfig, OmegaConf
 
 from csm.commands.app import command
-from csm.commands.learned import PURPOSES
+from csm.commands.learned import LEARNED
 from csm.commands.learned import make as make_learned
 from csm.data.prepare import processes
 from csm.data.store import Store
@@ -24,7 +24,7 @@ from csm.studies.study import Context, Findings, write_findings
 
 
 def _listing() -> str:
-    return "\n".join([listing(), *(f"  {name:<10}{purpose}" for name, purpose in PURPOSES.items())])
+    return "\n".join([listing(), *(f"  {name:<12}{entry.purpose}" for name, entry in LEARNED.items())])
 
 
 OmegaConf.register_new_resolver("studies", _listing, replace=True)
@@ -61,7 +61,7 @@ def make_studies(cfg: DictConfig, names: Sequence[str]) -> dict[str, Any]:
 
 
 def _maker(cfg: DictConfig, context: Context, name: str) -> Callable[[], Findings]:
-    if name in PURPOSES:
+    if name in LEARNED:
         return partial(make_learned, cfg, context, name)
     return partial(study(name).load(), context, **options_of(cfg, name))
 

@@ -40,7 +40,7 @@ class ResultRow:
     seeds
         Of training, one per run that was averaged; empty if nothing is random.
     epochs
-        Of training; None if nothing is trained.
+        Of training; None if nothing is trained.  The fewest of the seeds where a limit of time ended them.
     pairs
         Number of pairs of shapes.
     distance, normaliser
@@ -164,7 +164,7 @@ def average_seeds(rows: Iterable[ResultRow]) -> list[ResultRow]:
     Raises
     ------
     DataError
-        If rows of one key follow different protocols, numbers of epochs, or repeat a seed.
+        If rows of one key follow different protocols, or repeat a seed.
     """
     groups: dict[Key, list[ResultRow]] = {}
     for row in rows:
@@ -175,11 +175,12 @@ def average_seeds(rows: Iterable[ResultRow]) -> list[ResultRow]:
 def _average(rows: Sequence[ResultRow]) -> ResultRow:
     first = rows[0]
     seeds = tuple(seed for row in rows for seed in row.seeds)
-    if len({(row.protocol, row.epochs) for row in rows}) > 1 or len(set(seeds)) < len(seeds) or len(seeds) < len(rows):
+    if len({row.protocol for row in rows}) > 1 or len(set(seeds)) < len(seeds) or len(seeds) < len(rows):
         raise DataError(
-            f"{first.method} on {first.test}: rows of {len(rows)} seeds differ in protocol or epochs or repeat a seed, "
-            "so they have no mean"
+            f"{first.method} on {first.test}: rows of {len(rows)} seeds differ in protocol or repeat a seed, so they "
+            "have no mean"
         )
+    epochs = [row.epochs for row in rows if row.epochs is not None]
 
     def mean(name: str) -> float | None:
         values = [getattr(row, name) for row in rows]
@@ -191,6 +192,7 @@ def _average(rows: Sequence[ResultRow]) -> ResultRow:
         **averaged,
         age_std=float(np.std([row.age for row in rows], ddof=1)),
         seeds=seeds,
+        epochs=min(epochs, default=None),
         seconds=round(sum(row.seconds for row in rows), 1),
         commit=" ".join(dict.fromkeys(row.commit for row in rows)),
     )

@@ -16,7 +16,7 @@ from csm.evaluation.matching import Votes, votes
 from csm.learning.loss import Products, linear_cross_entropy
 from csm.networks import CorrespondenceNetwork, Surface, build
 
-Schedule = Literal["constant", "cosine", "step", "one_cycle"]
+Schedule = Literal["constant", "cosine", "step", "drop", "one_cycle"]
 
 FORMAT = 1
 """Version of the hyper-parameters in a checkpoint."""
@@ -42,8 +42,8 @@ class CSMModule(L.LightningModule):
     lr, weight_decay
         Of Adam (betas 0.9 and 0.999, eps 1e-8).
     schedule
-        Of the learning rate: "constant", "cosine" (to zero), "step" (halved at every third of the training) or
-        "one_cycle" (rises for 30 % of the training, then falls).
+        Of the learning rate: "constant", "cosine" (to zero), "step" (halved at every third of the training),
+        "drop" (a tenth after 60 % of the training) or "one_cycle" (rises for 30 % of the training, then falls).
     loss_products
         Precision of the classifier's matrix products, see `linear_cross_entropy`.
     loss_rows
@@ -158,6 +158,8 @@ class CSMModule(L.LightningModule):
                 return CosineAnnealingLR(optimizer, steps)
             case "step":
                 return StepLR(optimizer, max(1, steps // 3), gamma=0.5)
+            case "drop":
+                return StepLR(optimizer, max(1, steps * 3 // 5), gamma=0.1)
             case "one_cycle":
                 return OneCycleLR(optimizer, self.lr, total_steps=steps + 1)  # it is stepped once after the last step
-        raise ConfigError(f"schedule is constant, cosine, step or one_cycle, got {self.schedule!r}")
+        raise ConfigError(f"schedule is constant, cosine, step, drop or one_cycle, got {self.schedule!r}")

@@ -17,6 +17,7 @@ from csm.networks.chebynet import ChebyNet
 from csm.networks.csmcnn import CSMCNN
 from csm.networks.csmconv import CSMConv
 from csm.networks.diffusionnet import DiffusionNet
+from csm.networks.identity import Identity
 from csm.networks.mgcn import MGCN
 from csm.networks.mgconv import MGConv
 from csm.networks.mlp import MLP
@@ -35,6 +36,7 @@ __all__ = [
     "ChebyNet",
     "CorrespondenceNetwork",
     "DiffusionNet",
+    "Identity",
     "MGConv",
     "SplineCNN",
     "Surface",
@@ -59,6 +61,7 @@ NETWORKS: dict[str, type[nn.Module]] = {
     "chebynet": ChebyNet,
     "csmcnn": CSMCNN,
     "diffusionnet": DiffusionNet,
+    "identity": Identity,
     "mgcn": MGCN,
     "mlp": MLP,
     "splinecnn": SplineCNN,

@@ -44,3 +44,30 @@ CONTENDERS: Mapping[str, Contender] = {
     "diffusionnet": Contender("DiffusionNet", "diffusionnet", "hks_diffusionnet"),
 }
 """The methods of Tables 4 to 6, and today's reference, by the names of the rows of experiments."""
+
+_ROWS = {
+    "paper": "CSMCNN",
+    "release": "CSMCNN as released",
+    "acd": "ACD alone",
+    "acd_mgcn": "ACD + MGCN",
+    "diffusionnet": "ACD + DiffusionNet",
+}
+
+
+def row_title(row: str) -> str:
+    """Return what tables and figures call a row of the experiments on learned methods.
+
+    Parameters
+    ----------
+    row
+        Such as "faust_mgcn" or "scape_paper"; behind a comma may stand the kind of matching.
+
+    Examples
+    --------
+    >>> row_title("faust_mgcn, argmax"), row_title("scape_paper"), row_title("ks_64")
+    ('MGCN, argmax', 'CSMCNN', 'ks_64')
+    """
+    name, comma, matching = row.partition(",")
+    method = name.partition("_")[2]
+    title = _ROWS.get(method) or (CONTENDERS[method].title if method in CONTENDERS else name)
+    return title + comma + matching

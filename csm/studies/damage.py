@@ -10,7 +10,6 @@ import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,35 +17,22 @@ import torch
 
 from csm._progress import progress_bar
 from csm._types import IntArray
-from csm.data.prepare import compute_features
 from csm.data.shapeset import Shape
-from csm.data.store import Store
-from csm.descriptors.base import record
-from csm.descriptors.presets import preset
 from csm.errors import ConfigError, MeshError
 from csm.evaluation.distances import MatchedPoints, target_errors
 from csm.evaluation.matching import nearest
-from csm.learning.export import load_module
-from csm.learning.meshes import describe_mesh
 from csm.mesh.correspondence import ground_truth
-from csm.mesh.io import atomic_path
 from csm.mesh.perturb import Damaged
 from csm.mesh.shape import Mesh
 from csm.operators.geodesic import Method as Distance
 from csm.studies.bodies import Bodies
+from csm.studies.contestants import Contestant
+from csm.studies.kept import kept
 from csm.studies.study import Context
 
 Damage = Callable[[Mesh], Damaged]
 TESTED = 20
 """The last so many bodies, which no network was trained on."""
-
-
-@dataclass(frozen=True, eq=False)
-class Contestant:
-    """A way to describe a mesh, and what tells it from others in keys of what is kept."""
-
-    key: str
-    describe: Callable[[Mesh], torch.Tensor]
 
 
 @dataclass(frozen=True)
@@ -70,38 +56,6 @@ class Plan:
     def __post_init__(self) -> None:
         if min(self.n_pairs, self.points) < 1:
             raise ConfigError(f"pairs and points are from 1, got {self.n_pairs} and {self.points}")
-
-
-def contestants(descriptors: Sequence[str], checkpoints: Mapping[str, str], store: Store) -> dict[str, Contestant]:
-    """Return presets of descriptors by their names, and trained networks by the names that they are given.
-
-    Raises
-    ------
-    ConfigError
-        If there is none, or a preset is unknown.
-    DataError
-        If a checkpoint cannot be read.
-    """
-    if not descriptors and not checkpoints:
-        raise ConfigError("name a descriptor, or a checkpoint as figure12.checkpoints={NAME:PATH}")
-    found = {name: _descriptor(name, store) for name in descriptors}
-    return found | {name: _network(Path(path), store) for name, path in checkpoints.items()}
-
-
-def _descriptor(name: str, store: Store) -> Contestant:
-    descriptor = preset(name)
-    return Contestant(
-        json.dumps(record(descriptor), sort_keys=True, default=str),
-        lambda mesh: torch.as_tensor(compute_features(mesh, descriptor, store)),
-    )
-
-
-def _network(path: Path, store: Store) -> Contestant:
-    module = load_module(path)
-    digest = hashlib.sha256()
-    for name, tensor in sorted(module.state_dict().items()):
-        digest.update(name.encode() + tensor.detach().cpu().numpy().tobytes())
-    return Contestant(digest.hexdigest(), lambda mesh: describe_mesh(module, mesh, store))
 
 
 def damage_rows(
@@ -128,7 +82,11 @@ def damage_rows(
                     "plan": [plan.points, plan.distance, context.seed],
                 }
                 found[title, method].append(
-                    _kept(context.out / "damage", question, lambda: _measure(target, sources, once, contestant, plan))  # noqa: B023
+                    kept(
+                        context.out / "damage" / _file(question),
+                        question,
+                        lambda: _measure(target, sources, once, contestant, plan, context.seed),  # noqa: B023
+                    )
                 )
     return [{"damage": title, "method": method, **_summary(cells)} for (title, method), cells in found.items()]
 
@@ -139,38 +97,30 @@ def _draw_pairs(names: Sequence[str], n: int, seed: int) -> list[tuple[str, str]
     return [pairs[i] for i in sorted(chosen)]
 
 
-def _kept(folder: Path, question: Mapping[str, Any], make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    name = hashlib.sha256(json.dumps(dict(question), sort_keys=True).encode()).hexdigest()[:24]
-    path = folder / f"{name}.json"
-    if path.exists():
-        kept: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        return kept
-    made = make()
-    with atomic_path(path) as temporary:
-        temporary.write_text(json.dumps(made) + "\n", encoding="utf-8")
-    return made
+def _file(question: Mapping[str, Any]) -> str:
+    return f"{hashlib.sha256(json.dumps(dict(question), sort_keys=True).encode()).hexdigest()[:24]}.json"
 
 
 def _measure(
-    target: Shape, sources: Sequence[Shape], damage: Damage, contestant: Contestant, plan: Plan
+    target: Shape, sources: Sequence[Shape], damage: Damage, contestant: Contestant, plan: Plan, seed: int
 ) -> dict[str, Any]:
     try:
         damaged = damage(target.mesh)
         there = contestant.describe(damaged.mesh)
     except MeshError as error:
         return {"failed": str(error)}
-    matched = [_matched(source, target, damaged, there, contestant, plan.points) for source in sources]
+    matched = [_matched(source, target, damaged, there, contestant, plan.points, seed) for source in sources]
     measured = target_errors(target.mesh, plan.distance, "diameter", matched)
     errors = np.concatenate([e.distance for e in measured.errors]) / measured.lengths.diameter
     return {"errors": errors.round(6).tolist(), "left": len(damaged.kept) / target.mesh.n_vertices}
 
 
 def _matched(
-    source: Shape, target: Shape, damaged: Damaged, there: torch.Tensor, contestant: Contestant, points: int
+    source: Shape, target: Shape, damaged: Damaged, there: torch.Tensor, contestant: Contestant, points: int, seed: int
 ) -> MatchedPoints:
     truth = ground_truth(source.truth, target.truth)
     left: IntArray = np.flatnonzero(np.isin(truth.target, damaged.kept))
-    chosen = left[np.random.default_rng(0).permutation(len(left))[:points]]
+    chosen = left[np.random.default_rng(seed).permutation(len(left))[:points]]
     here = contestant.describe(source.mesh)
     found = damaged.kept[nearest(here[torch.as_tensor(truth.source[chosen])], there)]
     return MatchedPoints(truth.target[chosen], found)

@@ -12,7 +12,8 @@ from csm.errors import ConfigError
 from csm.mesh.perturb import with_noise
 from csm.operators.geodesic import Method
 from csm.studies.bodies import Bodies, Source, find_bodies
-from csm.studies.damage import Plan, contestants, damage_rows
+from csm.studies.contestants import contestants
+from csm.studies.damage import Plan, damage_rows
 from csm.studies.study import Context, Findings
 from csm.viewer.figures import save_figure
 from csm.viewer.style import line_style, new_figure
@@ -40,7 +41,8 @@ def run(
     descriptors
         Names of presets that match as they are.
     checkpoints
-        Name -> file of a trained network.
+        Name -> file of a trained network; by default those of the learned tables, see
+        `csm.studies.contestants.contestants`.
     strengths
         Standard deviations of each coordinate of the noise, in mean edge lengths.
     n_pairs, points, distance
@@ -54,7 +56,7 @@ def run(
     if not strengths or min(strengths) < 0:
         raise ConfigError(f"figure12: strengths are numbers from 0, got {list(strengths)}")
     bodies = find_bodies(source, context)
-    methods = contestants(descriptors, checkpoints or {}, context.store)
+    methods = contestants(descriptors, checkpoints, context, bodies)
     damages = {f"{strength:g}": partial(with_noise, strength=float(strength)) for strength in sorted(strengths)}
     rows = damage_rows(context, bodies, damages, methods, Plan(n_pairs, points, distance))
     rows = [{"noise": float(row.pop("damage")), **row} for row in rows]

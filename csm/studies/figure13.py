@@ -12,7 +12,8 @@ from csm.mesh.perturb import Damaged, grown_together, with_noise, without_part
 from csm.mesh.shape import Mesh
 from csm.operators.geodesic import Method
 from csm.studies.bodies import Bodies, Source, find_bodies
-from csm.studies.damage import Damage, Plan, contestants, damage_rows
+from csm.studies.contestants import contestants
+from csm.studies.damage import Damage, Plan, damage_rows
 from csm.studies.study import Context, Findings
 from csm.viewer.comparisons import dots_figure
 from csm.viewer.figures import save_figure
@@ -40,7 +41,8 @@ def run(
     descriptors
         Names of presets that match as they are.
     checkpoints
-        Name -> file of a trained network.
+        Name -> file of a trained network; by default those of the learned tables, see
+        `csm.studies.contestants.contestants`.
     fractions
         Shares of the area that are cut away, around one of the extremities.
     n_pairs, points, distance
@@ -54,7 +56,7 @@ def run(
     if any(not 0 < fraction < 1 for fraction in fractions):
         raise ConfigError(f"figure13: fractions are between 0 and 1, got {list(fractions)}")
     bodies = find_bodies(source, context)
-    methods = contestants(descriptors, checkpoints or {}, context.store)
+    methods = contestants(descriptors, checkpoints, context, bodies)
     damages: dict[str, Damage] = {"none": partial(with_noise, strength=0.0)}
     damages |= {f"{100 * f:g} % cut away": partial(cut_extremity, fraction=float(f)) for f in fractions}
     damages["grown together"] = grown_together

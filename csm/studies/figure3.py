@@ -14,32 +14,23 @@ Only training shapes are used: persons 0 to 7 of FAUST, shapes 0 to 79.
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from csm._types import FloatArray
-from csm.data.datasets import find_set
-from csm.data.humansset import HumansSet
 from csm.data.shapeset import ShapeSet
 from csm.descriptors.chebyshev import ACD
 from csm.descriptors.presets import preset
-from csm.errors import ConfigError, DataError
+from csm.errors import ConfigError
 from csm.operators.geodesic import Method
-from csm.studies.acdsweep import Task
-from csm.studies.pool import run_all
+from csm.studies.couples import PERSONS, Task, measure, same_person_couples, training_shapes
 from csm.studies.study import Context, Findings
 from csm.viewer.comparisons import Sweep, sweeps_figure
 from csm.viewer.figures import save_figure
 
-PERSONS, POSES = 8, 10
-"""Of the training shapes, which come person by person."""
-
-_log = logging.getLogger(__name__)
 LABELS = {"alpha": "strength α", "angles": "angles J", "k": "eigenpairs K", "order": "order D"}
 
 
@@ -85,12 +76,12 @@ def run(
     if not isinstance(centre, ACD):
         raise ConfigError(f"figure3: {base} is not a preset of ACD, whose parameters are studied")
     wanted = {name: [vary(centre, name, value) for value in sorted(values)] for name, values in sweeps.items()}
-    shapes = shapes or _training_shapes(context)
+    shapes = shapes or training_shapes(context)
     couples = same_person_couples(shapes.names, n_pairs, context.seed)
     folder = context.out / "figure3"
     settings = list(dict.fromkeys(setting for values in wanted.values() for setting in values))
     tasks = [Task(shapes, couple, folder, points, context.seed, distance) for couple in couples]
-    errors = _measure(tasks, settings, context.workers)
+    errors = measure(tasks, settings, context.workers)
     rows = [
         _row(name, value, setting, 1000 * errors[setting])
         for name, values in sweeps.items()
@@ -111,64 +102,6 @@ def vary(centre: ACD, name: str, value: float) -> ACD:
         return replace(centre, alpha=float(value), angles=centre.angles if value else 1)
     changes: dict[str, Any] = {name: int(value)}
     return replace(centre, **changes)
-
-
-def same_person_couples(names: Sequence[str], n_pairs: int, seed: int) -> list[tuple[str, str]]:
-    """Return n_pairs / 2 couples of poses, spread evenly over the persons; no shape twice while there are others.
-
-    Parameters
-    ----------
-    names
-        Of all shapes, person by person; only those of the training persons are used.
-    n_pairs
-        Twice the number of couples, since each is matched both ways.
-    seed
-        Of the draw.
-
-    Raises
-    ------
-    ConfigError
-        If `n_pairs` is odd, not positive, or more than there are.
-
-    Examples
-    --------
-    >>> same_person_couples([str(i) for i in range(100)], 4, seed=0)
-    [('4', '6'), ('12', '19')]
-    """
-    people = [names[start : start + POSES] for start in range(0, PERSONS * POSES, POSES)]
-    people = [poses for poses in people if len(poses) >= 2]
-    most = 2 * sum(len(poses) // 2 for poses in people)
-    if n_pairs < 2 or n_pairs % 2 or n_pairs > most:
-        raise ConfigError(f"figure3: n_pairs={n_pairs}; wanted an even number from 2 to {most}")
-    rng = np.random.default_rng(seed)
-    orders = [rng.permutation(len(poses)) for poses in people]
-    found = []
-    for turn in range(POSES // 2):
-        for poses, order in zip(people, orders, strict=True):
-            if 2 * turn + 1 < len(poses):
-                found.append((poses[order[2 * turn]], poses[order[2 * turn + 1]]))
-    return found[: n_pairs // 2]
-
-
-def _training_shapes(context: Context) -> ShapeSet:
-    try:
-        return find_set(context.root, "FAUST_5k_remeshed")
-    except DataError as error:
-        _log.info("the built-in humans are taken: %s", error)
-        return HumansSet("remeshed", 5000, str(context.store.root))
-
-
-def _measure(tasks: Sequence[Task], settings: Sequence[ACD], workers: int) -> dict[ACD, FloatArray]:
-    """Return the mean errors of each setting over all ordered pairs, task by task, shape (n_pairs,)."""
-    errors = run_all(
-        partial(Task.errors, settings=settings),
-        tasks,
-        lambda task: " and ".join(task.couple),
-        workers,
-        what="figure3",
-        unit="couple",
-    )
-    return dict(zip(settings, np.concatenate(errors, axis=1), strict=True))
 
 
 def _row(name: str, value: float, setting: ACD, errors: FloatArray) -> dict[str, Any]:

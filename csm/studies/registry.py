@@ -32,8 +32,10 @@ STUDIES: Mapping[str, Study] = {
     "figure4": Study("share of points within an error, all descriptors", "csm.studies.figure4"),
     "figure5": Study("pictures of descriptor distances on one body", "csm.studies.figure5"),
     "figure6": Study("pictures of descriptor distances across bodies", "csm.studies.figure6"),
+    "figure10": Study("pictures of errors on one body, all methods, across resolutions", "csm.studies.figure10"),
     "figure12": Study("errors over noise of the vertices", "csm.studies.figure12"),
     "figure13": Study("errors with parts cut away or grown together", "csm.studies.figure13"),
+    "assumptions": Study("errors when what the sources leave open is chosen otherwise", "csm.studies.assumptions"),
     "stability": Study("change of all descriptors across resolutions of one body", "csm.studies.stability"),
 }
 """Every study; a new one is one line here and, if it has options, a section of conf/reproduce.yaml."""
@@ -59,4 +61,4 @@ def study(name: str) -> Study:
 
 def listing() -> str:
     """Return one line per study for ``--help``."""
-    return "\n".join(f"  {name:<10}{entry.purpose}" for name, entry in STUDIES.items())
+    return "\n".join(f"  {name:<12}{entry.purpose}" for name, entry in STUDIES.items())

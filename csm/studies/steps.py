@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import multiprocessing
 import sys
 import time
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,7 +21,6 @@ from csm.descriptors.presets import preset
 from csm.learning.meshes import stencils_for
 from csm.learning.module import CSMModule
 from csm.mesh.correspondence import PointMap
-from csm.mesh.io import atomic_path
 from csm.mesh.shape import Mesh
 from csm.studies.contenders import Contender
 
@@ -51,6 +48,11 @@ class Cost:
     share: float
     megabytes: float | None
 
+    @classmethod
+    def from_plain(cls, content: Mapping[str, Any]) -> Cost:
+        """Return the cost that `dataclasses.asdict` and json made plain data of."""
+        return cls(**{**content, "train": tuple(content["train"]), "test": tuple(content["test"])})
+
     @property
     def seconds(self) -> float:
         """Median of a training step."""
@@ -71,22 +73,6 @@ def cost_of(contender: Contender, mesh: Mesh, store: Store, threads: int, repeat
     prepare_shape(shape, _recipe(contender), store)
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
         return pool.submit(_measure, contender, shape, str(store.root), threads, repeats).result()
-
-
-def read_cost(path: Path, question: Mapping[str, Any]) -> Cost | None:
-    """Return the cost that a file keeps, if it answers this question."""
-    if not path.exists():
-        return None
-    kept = json.loads(path.read_text(encoding="utf-8"))
-    if kept.pop("question", None) != dict(question):
-        return None
-    return Cost(**{**kept, "train": tuple(kept["train"]), "test": tuple(kept["test"])})
-
-
-def write_cost(path: Path, question: Mapping[str, Any], cost: Cost) -> None:
-    """Keep a cost and the question that it answers."""
-    with atomic_path(path) as temporary:
-        temporary.write_text(json.dumps({"question": dict(question), **asdict(cost)}, indent=1) + "\n", "utf-8")
 
 
 def _recipe(contender: Contender) -> Recipe:

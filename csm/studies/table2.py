@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import logging
-import os
-import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -21,16 +17,14 @@ from csm.data.store import Store
 from csm.descriptors.base import record
 from csm.descriptors.presets import preset
 from csm.errors import ConfigError, DataError
-from csm.mesh.io import atomic_path
 from csm.mesh.shape import Mesh
 from csm.studies.bodies import RIVALS
+from csm.studies.kept import kept, this_machine
 from csm.studies.published import SECONDS_AT_6890, family
 from csm.studies.study import Context, Findings
 from csm.studies.timing import Timed, time_descriptor
 from csm.viewer.figures import save_figure
 from csm.viewer.style import line_style, new_figure
-
-_log = logging.getLogger(__name__)
 
 SHAPE = "tr_reg_000"
 """The body of FAUST that is timed."""
@@ -150,19 +144,13 @@ def times_figure(seconds: Mapping[str, Mapping[int, float]]) -> Figure:
 
 
 def _cell(path: Path, mesh: Mesh, parameters: Mapping[str, Any], threads: int, repeats: int) -> Timed:
-    question = json.loads(
-        json.dumps({"mesh": mesh.digest, "parameters": dict(parameters), "threads": threads, "repeats": repeats})
+    question = {"mesh": mesh.digest, "parameters": dict(parameters), "threads": threads, "repeats": repeats}
+    answer = kept(
+        path,
+        {**question, "machine": this_machine()},
+        lambda: asdict(time_descriptor(mesh, parameters, threads, repeats)),
     )
-    question["machine"] = f"{platform.machine()}, {os.cpu_count()} processors"
-    if path.exists():
-        kept = json.loads(path.read_text(encoding="utf-8"))
-        if kept.pop("question", None) == question:
-            return Timed(tuple(kept["wall"]), tuple(kept["cpu"]))
-        _log.warning("%s answers another question (mesh, parameters, repeats or machine); it is made again", path)
-    timed = time_descriptor(mesh, parameters, threads, repeats)
-    with atomic_path(path) as temporary:
-        temporary.write_text(json.dumps({"question": question, **asdict(timed)}, indent=1) + "\n", encoding="utf-8")
-    return timed
+    return Timed(tuple(answer["wall"]), tuple(answer["cpu"]))
 
 
 def _seconds(name: str, threads: int, times: Mapping[tuple[str, int, int], Timed]) -> dict[int, float]:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
-import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
@@ -13,7 +10,8 @@ from csm._progress import progress_bar
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.studies.contenders import CONTENDERS
-from csm.studies.steps import Cost, cost_of, read_cost, write_cost
+from csm.studies.kept import kept, this_machine
+from csm.studies.steps import Cost, cost_of
 from csm.studies.study import Context, Findings
 from csm.studies.table2 import timed_mesh
 
@@ -89,19 +87,15 @@ def run(
 
 def _cell(context: Context, name: str, mesh: Mesh, threads: int, repeats: int) -> Cost:
     question = {
-        "contender": json.loads(json.dumps(asdict(CONTENDERS[name]))),
+        "contender": asdict(CONTENDERS[name]),
         "mesh": mesh.digest,
         "threads": threads,
         "repeats": repeats,
-        "machine": f"{platform.machine()}, {os.cpu_count()} processors",
+        "machine": this_machine(),
     }
     path = context.out / "costs" / f"{name}_{mesh.n_vertices}_{threads}.json"
-    kept = read_cost(path, question)
-    if kept is not None:
-        return kept
-    cost = cost_of(CONTENDERS[name], mesh, context.store, threads, repeats)
-    write_cost(path, question, cost)
-    return cost
+    answer = kept(path, question, lambda: asdict(cost_of(CONTENDERS[name], mesh, context.store, threads, repeats)))
+    return Cost.from_plain(answer)
 
 
 def _row(name: str, costs: Mapping[str, Cost], train_shapes: int, test_shapes: int) -> dict[str, Any]:

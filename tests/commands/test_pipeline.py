@@ -172,12 +172,26 @@ def test_a_matrix_fills_only_the_rows_asked_for_and_ends_a_training_in_time(benc
     options = [*SMALL, "data.root=toys", "trainer.max_epochs=99999", "trainer.max_time='00:00:00:02'"]
     rows = [f"+rows.{name}=[" + ",".join(f'"{x}"' for x in options) + "]" for name in ("one", "two")]
     bench.run("matrix", "folder=timed", "only=[two]", *rows)
-    (row,) = read_rows(bench.folder / "timed/table.json")
+    (row,) = read_rows(bench.folder / "timed/matrix.json")
     assert row.method == "two"
     assert 0 < row.epochs < 9999
     with pytest.raises(SystemExit):
         bench.run("matrix", "folder=timed", "only=[three]", *rows)
     assert "no row three; it has one, two" in capsys.readouterr().err
+
+
+def test_a_row_that_was_trained_otherwise_is_not_taken_for_another(bench, capsys):
+    def fill(*changes):
+        options = ",".join(f'"{x}"' for x in (*SMALL, "data.root=toys", *changes))
+        bench.run("matrix", "folder=shared", f"+rows.one=[{options}]")
+
+    fill()
+    fill("data.test_roots=[toys]", "trainer.enable_progress_bar=false")  # changes nothing of the training
+    before = (bench.folder / "shared/one/seed0/model.ckpt").read_bytes()
+    with pytest.raises(SystemExit):
+        fill("model.dropout=0.25")
+    assert "model.dropout: 0 there, 0.25 wanted" in capsys.readouterr().err
+    assert (bench.folder / "shared/one/seed0/model.ckpt").read_bytes() == before
 
 
 def test_a_table_of_learned_methods_is_reproduced_from_its_matrix(bench):
@@ -194,7 +208,7 @@ def test_a_table_of_learned_methods_is_reproduced_from_its_matrix(bench):
     assert [line["method"] for line in record["rows"]] == ["toy", "toy, argmax"]
     assert record["rows"][0]["seeds"] == "0 1"
     assert record["rows"][0]["toys paper"] is None
-    assert (bench.folder / "shown/figure7_toys.png").exists()
+    assert (bench.folder / "shown/table4.png").exists()
 
 
 @pytest.mark.parametrize("by", ["descriptor=hks descriptor.k=40", "checkpoint=run/model.ckpt"])

@@ -90,7 +90,17 @@ def test_isotropic_needs_no_frame_and_is_one_block():
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"alpha": -1}, {"angles": 0}, {"k": 1}, {"order": -1}, {"alpha": float("nan")}, {"cuts": 0}, {"cuts": 10}]
+    "wrong",
+    [
+        {"alpha": -1},
+        {"angles": 0},
+        {"k": 1},
+        {"order": -1},
+        {"alpha": float("nan")},
+        {"cuts": 0},
+        {"cuts": 10},
+        {"damping": -1},
+    ],
 )
 def test_settings_out_of_range_are_refused(wrong):
     with pytest.raises(ConfigError, match="wanted"):
@@ -139,3 +149,12 @@ def test_released_settings_reproduce_the_authors_descriptor(data_set):
     assert error(ours) < 0.08
     assert error(ours[:, -np.arange(8) % 8]) > 0.2  # the angle turned the other way
     assert min(error(np.roll(ours, shift, axis=1)) for shift in range(1, 8)) > 0.2
+
+
+def test_damping_divides_each_degree_and_is_named_only_where_there_is_any():
+    operators = Operators(blob(2))
+    plain, damped = (ACD(angles=3, k=7, order=3, cuts=2, damping=d) for d in (0.0, 0.5))
+    expected = plain(operators).values.reshape(-1, 6, 4) / np.sqrt([1, 2, 3, 4])
+    np.testing.assert_allclose(damped(operators).values.reshape(-1, 6, 4), expected)
+    assert damped.parameters() == {**plain.parameters(), "damping": 0.5}
+    assert ACD.own().damping == 0.5

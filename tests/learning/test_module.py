@@ -122,7 +122,7 @@ def test_what_is_no_checkpoint_is_named(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("schedule", "last"), [("cosine", 0.0), ("step", 0.125e-2), ("one_cycle", 4e-8), ("constant", 1e-2)]
+    ("schedule", "last"), [("cosine", 0.0), ("step", 0.125e-2), ("drop", 1e-3), ("one_cycle", 4e-8), ("constant", 1e-2)]
 )
 def test_schedules_end_where_they_should(datamodule, tmp_path, schedule, last):
     trainer = train(make(datamodule, schedule=schedule), datamodule, tmp_path, 3, limit_val_batches=0)

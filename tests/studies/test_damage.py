@@ -5,16 +5,10 @@ from functools import partial
 import pytest
 import torch
 
-from csm.data.store import Store
-from csm.descriptors import preset
-from csm.descriptors.base import record
-from csm.errors import ConfigError, DataError
-from csm.learning.export import export_module
-from csm.learning.module import CSMModule
 from csm.mesh.perturb import with_noise
 from csm.studies import damage
-from csm.studies.damage import Contestant, Plan, contestants, damage_rows
-from tests.shapes import blob
+from csm.studies.contestants import Contestant, contestants
+from csm.studies.damage import Plan, damage_rows
 from tests.studies.toys import toy_bodies, toy_context
 
 PLAN = Plan(n_pairs=2, points=30, distance="edge")
@@ -22,7 +16,7 @@ PLAN = Plan(n_pairs=2, points=30, distance="edge")
 
 def test_what_was_measured_is_kept_for_its_question_only(tmp_path, monkeypatch):
     context, bodies = toy_context(tmp_path), toy_bodies()
-    methods = contestants(["acd_isotropic"], {}, context.store)
+    methods = contestants(["acd_isotropic"], {}, context, bodies)
     damages = {"none": partial(with_noise, strength=0.0)}
     first = damage_rows(context, bodies, damages, methods, PLAN)
 
@@ -56,23 +50,3 @@ def damage_of(mesh):
     from csm.studies.figure13 import cut_extremity
 
     return cut_extremity(mesh, 0.15)
-
-
-def test_a_trained_network_is_a_method_like_any_other(tmp_path):
-    torch.manual_seed(0)
-    store = Store(tmp_path / "store")
-    network = {"name": "csmcnn", "ks": 16, "channels": [8, 8], "terms": 2}
-    module = CSMModule(network, 7, 162, record(preset("acd_isotropic")), basis_k=16)
-    path = export_module(module, tmp_path / "export", classifier=True)
-    (method,) = contestants([], {"net": str(path)}, store).values()
-    assert method.describe(blob(2)).shape == (162, 256)
-    module.network.lift.bias.data += 1
-    other = contestants([], {"net": str(export_module(module, tmp_path / "other", classifier=True))}, store)["net"]
-    assert other.key != method.key
-
-
-def test_nothing_to_compare_is_an_error(tmp_path):
-    with pytest.raises(ConfigError, match="checkpoint"):
-        contestants([], {}, Store(tmp_path))
-    with pytest.raises(DataError, match="no such checkpoint"):
-        contestants([], {"x": str(tmp_path / "x.ckpt")}, Store(tmp_path))

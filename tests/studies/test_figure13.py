@@ -20,7 +20,7 @@ def test_every_damage_has_its_row_and_what_it_leaves(tmp_path, monkeypatch):
     assert 0.6 < cut["vertices left"] < 0.95
     assert cut["error"] > none["error"]
     assert (grown["error"], grown["failed"]) == (None, "nothing touches")
-    assert "acd_isotropic, grown together: nothing touches" in found.notes
+    assert "ACD isotropic, grown together: nothing touches" in found.notes
     assert found.pictures[0].is_file()
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from csm.descriptors.chebyshev import ACD
 from csm.errors import ConfigError
-from csm.studies import figure3
+from csm.studies import couples, figure3
 from tests.studies.toys import Toys, toy_context
 
 NAMES = tuple(f"toy{i}" for i in range(20))
@@ -36,32 +36,18 @@ def test_what_is_there_is_not_measured_again(tmp_path, monkeypatch):
     context = toy_context(tmp_path)
     first = figure3.run(context, shapes=Toys(NAMES), n_pairs=2, **GRID)
     asked: list[ACD] = []
-    measure = figure3.Task.errors.__globals__["couple_errors"]
+    measure = couples.couple_errors
 
     def spy(one, other, settings, task):
         asked.extend(settings)
         return measure(one, other, settings, task)
 
-    monkeypatch.setattr("csm.studies.acdsweep.couple_errors", spy)
+    monkeypatch.setattr("csm.studies.couples.couple_errors", spy)
     again = figure3.run(context, shapes=Toys(NAMES), n_pairs=2, **GRID)
     assert again.rows == first.rows
     assert asked == []
     figure3.run(context, shapes=Toys(NAMES), n_pairs=2, **GRID | {"orders": (3, 4)})
     assert asked == [ACD(order=4)]
-
-
-def test_couples_are_two_poses_of_one_training_person():
-    names = [str(i) for i in range(100)]
-    couples = figure3.same_person_couples(names, 32, seed=1)
-    assert len(couples) == 16
-    people = [int(a) // 10 for a, b in couples]
-    assert people == [int(b) // 10 for a, b in couples]
-    assert sorted(people) == sorted(2 * list(range(8)))
-    assert len({name for couple in couples for name in couple}) == 32
-    assert couples[:8] == figure3.same_person_couples(names, 16, seed=1)
-    for wrong in (0, 3, 82):
-        with pytest.raises(ConfigError, match="from 2 to 80"):
-            figure3.same_person_couples(names, wrong, seed=0)
 
 
 def test_only_acd_has_these_parameters(tmp_path):

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from csm.descriptors.chebyshev import ACD
-from csm.studies import acdsweep
-from csm.studies.acdsweep import Task, couple_errors
+from csm.errors import ConfigError
+from csm.studies import couples
+from csm.studies.couples import Task, couple_errors, same_person_couples
 from tests.studies.toys import Toys
 
 SETTINGS = [
@@ -26,8 +27,8 @@ def test_each_eigenproblem_is_solved_once_and_the_errors_are_those_of_each_setti
     shapes = [Toys().load(name) for name in ("toy0", "toy1")]
     alone = [couple_errors(*shapes, [setting], task)[0] for setting in SETTINGS]
     solved: list[int] = []
-    solve = acdsweep.Operators._solve
-    monkeypatch.setattr(acdsweep.Operators, "_solve", lambda self, m, k: solved.append(k) or solve(self, m, k))
+    solve = couples.Operators._solve
+    monkeypatch.setattr(couples.Operators, "_solve", lambda self, m, k: solved.append(k) or solve(self, m, k))
     np.testing.assert_allclose(couple_errors(*shapes, SETTINGS, task), alone)
     # The 4 angles of J=8 between those of J=4 need K=6 only; two shapes.
     assert sorted(solved) == sorted(2 * [6, 6, 6, 6, 9, 12, 12, 12, 12])
@@ -53,3 +54,17 @@ def test_errors_of_other_meshes_are_not_taken_for_these(task):
     moved = Task(Toys(("toy1", "toy0", "toy2")), task.couple, task.folder, 30, distance="edge")
     assert moved.path == task.path
     np.testing.assert_allclose(moved.errors(SETTINGS[:2]), first[:, ::-1])
+
+
+def test_couples_are_two_poses_of_one_training_person():
+    names = [str(i) for i in range(100)]
+    found = same_person_couples(names, 32, seed=1)
+    assert len(found) == 16
+    people = [int(a) // 10 for a, b in found]
+    assert people == [int(b) // 10 for a, b in found]
+    assert sorted(people) == sorted(2 * list(range(8)))
+    assert len({name for couple in found for name in couple}) == 32
+    assert found[:8] == same_person_couples(names, 16, seed=1)
+    for wrong in (0, 3, 82):
+        with pytest.raises(ConfigError, match="from 2 to 80"):
+            same_person_couples(names, wrong, seed=0)
