@@ -117,7 +117,7 @@ def run(
     rows = [_row(name, title, 1000 * errors[descriptor]) for (name, title), descriptor in wanted.items()]
     names = [f"{label(name)}: {title}" if title != AS_IN_TABLE else label(name) for name, title in wanted]
     path = context.out / "assumptions.png"
-    save_figure(path, dots_figure(names, {_QUANTITY: {"mean error": [row["error"] for row in rows]}}))
+    save_figure(path, dots_figure(names, {_QUANTITY: {"": [row["error"] for row in rows]}}))
     notes = (
         f"error: mean over {n_pairs} ordered pairs of {points} points each, in thousandths of the target's geodesic "
         f"diameter ({distance} distances); two poses of one of the first {PERSONS} persons, both ways; no test shape.",

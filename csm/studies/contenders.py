@@ -64,10 +64,10 @@ def row_title(row: str) -> str:
 
     Examples
     --------
-    >>> row_title("faust_mgcn, argmax"), row_title("scape_paper"), row_title("ks_64")
-    ('MGCN, argmax', 'CSMCNN', 'ks_64')
+    >>> row_title("faust_mgcn, argmax"), row_title("scape_paper"), row_title("add"), row_title("ks_64")
+    ('MGCN, argmax', 'CSMCNN', 'ADD', 'ks_64')
     """
     name, comma, matching = row.partition(",")
-    method = name.partition("_")[2]
+    method = name.partition("_")[2] or name
     title = _ROWS.get(method) or (CONTENDERS[method].title if method in CONTENDERS else name)
     return title + comma + matching

@@ -7,16 +7,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from matplotlib.figure import Figure
+
 from csm.data.datasets import find_set
 from csm.data.folderset import FolderSet
 from csm.descriptors.presets import preset
 from csm.errors import ConfigError, DataError
 from csm.evaluation.protocol import Pair, Protocol
-from csm.studies.bodies import RIVALS
+from csm.studies.bodies import RIVALS, label
 from csm.studies.cells import Cell, fill_cells
 from csm.studies.matching import Rules
 from csm.studies.published import AGE, ASSUMED, SETS, family
 from csm.studies.study import Context, Findings
+from csm.viewer.comparisons import dots_figure
+from csm.viewer.figures import save_figure
 
 _log = logging.getLogger(__name__)
 
@@ -70,8 +74,10 @@ def run(
     for key in columns:
         title = SETS[key].title
         shown += [f"{title} paper", f"{title} ours", f"{title} ranks"]
+    path = context.out / "table1.png"
+    save_figure(path, _draw(rows, columns))
     title = "Mean geodesic error of nearest-neighbour matching, in thousandths of the diameter."
-    return Findings("table1", title, (*shown, "assumed"), rows, _notes(columns, sets))
+    return Findings("table1", title, (*shown, "assumed"), rows, _notes(columns, sets), (path,))
 
 
 def measure_sets(
@@ -162,6 +168,18 @@ def _row(name: str, columns: Mapping[str, Column]) -> dict[str, Any]:
             "made": cell.made.commit,
         }
     return row
+
+
+def _draw(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, Column]) -> Figure:
+    """Plot ours and the paper's errors, a panel per set; a family that the paper has not is no dot there."""
+    panels = {
+        f"mean error on {SETS[key].title}": {
+            "paper": [row[f"{SETS[key].title} paper"] or float("nan") for row in rows],
+            "ours": [1000 * row[key]["age"] for row in rows],
+        }
+        for key in columns
+    }
+    return dots_figure([label(row["descriptor"]) for row in rows], panels)
 
 
 def _notes(columns: Mapping[str, Column], wanted: Sequence[str]) -> tuple[str, ...]:

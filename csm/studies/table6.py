@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
+from matplotlib.figure import Figure
+
 from csm._progress import progress_bar
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
@@ -14,6 +16,8 @@ from csm.studies.kept import kept, this_machine
 from csm.studies.steps import Cost, cost_of
 from csm.studies.study import Context, Findings
 from csm.studies.table2 import timed_mesh
+from csm.viewer.comparisons import dots_figure
+from csm.viewer.figures import save_figure
 
 COLUMNS = (
     "method",
@@ -82,7 +86,9 @@ def run(
         "The classifier serves the training only. MGCN as released has 2.85 million parameters, the paper prints 3.03.",
     )
     title = "Parameters, seconds per epoch and memory of the learned methods."
-    return Findings("table6", title, COLUMNS, rows, (*notes, *_busy(costs)))
+    path = context.out / "table6.png"
+    save_figure(path, _draw(rows))
+    return Findings("table6", title, COLUMNS, rows, (*notes, *_busy(costs)), (path,))
 
 
 def _cell(context: Context, name: str, mesh: Mesh, threads: int, repeats: int) -> Cost:
@@ -114,6 +120,16 @@ def _row(name: str, costs: Mapping[str, Cost], train_shapes: int, test_shapes: i
         "test to csmcnn": None if reference is None else cost.test_seconds / reference.test_seconds,
         "measurements": asdict(cost),
     }
+
+
+def _draw(rows: Sequence[Mapping[str, Any]]) -> Figure:
+    shown = {"parameters": ("parameters (million)", 1e-6), "train epoch s": ("training epoch (s)", 1.0)}
+    shown |= {"test epoch s": ("test epoch (s)", 1.0), "MB": ("peak memory (MB)", 1.0)}
+    panels = {
+        title: {"": [float("nan") if row[key] is None else unit * row[key] for row in rows]}
+        for key, (title, unit) in shown.items()
+    }
+    return dots_figure([row["method"] for row in rows], panels)
 
 
 def _busy(costs: Mapping[str, Cost]) -> tuple[str, ...]:

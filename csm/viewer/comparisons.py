@@ -24,7 +24,8 @@ def dots_figure(names: Sequence[str], panels: Mapping[str, Mapping[str, Sequence
     names
         Of the R rows, from top to bottom.
     panels
-        Label of the quantity -> condition -> its R values.
+        Label of the quantity -> condition -> its R values, not a number where there is none.  Panels have the same
+        conditions; a legend names them if there are several.
 
     Raises
     ------
@@ -49,7 +50,8 @@ def dots_figure(names: Sequence[str], panels: Mapping[str, Mapping[str, Sequence
     grid[0].set_yticks(heights, list(names))
     grid[0].set_ylim(len(names) - 0.5, -0.5)
     handles, labels = grid[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False, fontsize=8)
+    if len(labels) > 1:
+        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False, fontsize=8)
     return figure
 
 

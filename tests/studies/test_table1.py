@@ -42,6 +42,7 @@ def test_every_descriptor_has_a_row_with_the_paper_and_ours_for_every_set(findin
     assert [row["faust"]["paper_rank"] for row in findings.rows] == [1, 2, 3]
     assert findings.rows[2]["assumed"] == "all parameters"
     assert "| SHREC'19 paper | SHREC'19 ours |" in findings.markdown()
+    assert findings.pictures[0].is_file()
 
 
 def test_the_pairs_are_those_with_ground_truth_and_of_faust_of_one_person(context, findings):

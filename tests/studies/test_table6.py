@@ -24,6 +24,7 @@ def test_rows_have_parameters_seconds_memory_and_ratios_and_are_kept(context, mo
     assert first["without classifier"] == 1_906_602 - 1_770_730
     assert (first["train to csmcnn"], first["test to csmcnn"]) == (1, 1)
     assert second["train epoch s"] == pytest.approx(80 * sorted(second["measurements"]["train"])[0], rel=1)
+    assert findings.pictures[0].is_file()
     assert second["MB"] >= 0, "small networks fit in what the process had at its peak before"
 
     def never(*_):

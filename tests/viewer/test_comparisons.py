@@ -23,6 +23,10 @@ def test_dots_stand_in_the_row_of_their_name_from_top_to_bottom():
     assert error.get_xlim()[0] == 0
 
 
+def test_a_single_condition_needs_no_legend():
+    assert dots_figure(["a"], {"error": {"": [1.0]}}).legends == []
+
+
 def test_dots_need_one_value_per_row():
     with pytest.raises(ConfigError, match=r"\['fine'\] to draw; wanted 2 values"):
         dots_figure(["a", "b"], {"error": {"fine": [1]}})
