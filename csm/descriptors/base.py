@@ -46,6 +46,15 @@ def record(descriptor: Descriptor) -> dict[str, Any]:
     return {"name": descriptor.name, **descriptor.parameters()}
 
 
+def eigenpairs(descriptor: Descriptor) -> int:
+    """Return the greatest number of eigenpairs that a descriptor asks an operator for; 0 if it asks for none.
+
+    It is the descriptor's `eigenpairs` if it has such a property, else its parameter `k`.  Of several descriptors of
+    one shape the one that asks for most goes first, because a larger spectrum serves the smaller wishes.
+    """
+    return int(getattr(descriptor, "eigenpairs", getattr(descriptor, "k", 0)))
+
+
 def as_operators(shape: Mesh | Operators) -> Operators:
     """Return `shape` itself if it is `Operators`, else the operators of the mesh at unit area."""
     return Operators(shape) if isinstance(shape, Mesh) else shape

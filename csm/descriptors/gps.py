@@ -53,10 +53,15 @@ class GPS:
         if self.k < 1:
             raise ConfigError(f"{self}: wanted k of at least 1")
 
+    @property
+    def eigenpairs(self) -> int:
+        """K and the constant one."""
+        return self.k + 1
+
     def __call__(self, shape: Mesh | Operators) -> Features:
         """Return the descriptor of every vertex, (N, k), without unit."""
         operators = as_operators(shape)
-        spectrum = operators.lbo(self.k + 1)
+        spectrum = operators.lbo(self.eigenpairs)
         zeros = spectrum.n_zero()
         if zeros > 1:  # a mesh of several components has that many constant functions
             spectrum = operators.lbo(self.k + zeros)

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from csm.descriptors.base import Descriptor, Features, as_operators, record
+from csm.descriptors.base import Descriptor, Features, as_operators, eigenpairs, record
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.operators.bundle import Operators
@@ -45,6 +45,11 @@ class Stack:
         object.__setattr__(self, "parts", dict(self.parts))
         if not self.parts:
             raise ConfigError("a stack needs at least one descriptor")
+
+    @property
+    def eigenpairs(self) -> int:
+        """Of the part that asks for most."""
+        return max(eigenpairs(part) for part in self.parts.values())
 
     def __call__(self, shape: Mesh | Operators) -> Features:
         """Return the descriptor of every vertex, (N, sum of the parts' columns)."""

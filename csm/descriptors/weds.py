@@ -75,6 +75,11 @@ class WEDS:
             raise ConfigError(f"{self}: wanted k >= 2, levels >= 1 and n_filters >= levels + 2")
 
     @property
+    def eigenpairs(self) -> int:
+        """K and the constant one."""
+        return self.k + 1
+
+    @property
     def columns(self) -> tuple[str, ...]:
         """Names of the columns: for each gathering filter, counted from 1, all bands from coarse to fine."""
         bands = filter_names(self.n_filters)
@@ -83,7 +88,7 @@ class WEDS:
     def __call__(self, shape: Mesh | Operators) -> Features:
         """Return the descriptor of every vertex, (N, levels S), without unit."""
         operators = as_operators(shape)
-        spectrum = operators.lbo(self.k + 1)
+        spectrum = operators.lbo(self.eigenpairs)
         kept = slice(spectrum.n_zero(), None)
         evals, evecs = spectrum.evals[kept], spectrum.evecs[:, kept]
         filters = mexican_hat_filters(evals, self.n_filters, float(evals[-1]))

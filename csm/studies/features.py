@@ -9,7 +9,7 @@ from csm._types import Float32Array
 from csm.data.prepare import compute_features
 from csm.data.shapeset import ShapeSet
 from csm.data.store import Store
-from csm.descriptors.base import Descriptor
+from csm.descriptors.base import Descriptor, eigenpairs
 from csm.errors import CsmError
 from csm.mesh.shape import Mesh
 from csm.operators.bundle import Operators
@@ -50,7 +50,7 @@ def fill(
 def describe(mesh: Mesh, descriptors: Sequence[Descriptor], store: Store) -> list[Float32Array]:
     """Return descriptors of a mesh, each (N, Q), from the store or computed on shared operators and kept."""
     operators = Operators(mesh)
-    order = sorted(range(len(descriptors)), key=lambda at: _pairs(descriptors[at]), reverse=True)
+    order = sorted(range(len(descriptors)), key=lambda at: eigenpairs(descriptors[at]), reverse=True)
     values = {at: compute_features(mesh, descriptors[at], store, operators) for at in order}
     return [values[at] for at in range(len(descriptors))]
 
@@ -61,9 +61,3 @@ def _fill(task: _Task) -> str:
     except CsmError as error:
         return str(error)
     return ""
-
-
-def _pairs(descriptor: Descriptor) -> int:
-    """Return how many eigenpairs a descriptor asks for; those that ask for most come first, and serve the others."""
-    without_constant = descriptor.name in ("weds", "gps")  # these count the pairs that are not constant
-    return int(descriptor.parameters().get("k", 0)) + without_constant

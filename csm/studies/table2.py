@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
 from csm._progress import progress_bar
 from csm.data.datasets import find_set
@@ -18,7 +19,7 @@ from csm.descriptors.base import record
 from csm.descriptors.presets import preset
 from csm.errors import ConfigError, DataError
 from csm.mesh.shape import Mesh
-from csm.studies.bodies import RIVALS
+from csm.studies.bodies import RIVALS, label
 from csm.studies.kept import kept, this_machine
 from csm.studies.published import SECONDS_AT_6890, family
 from csm.studies.study import Context, Findings
@@ -78,7 +79,7 @@ def run(
                     bar.update()
     rows = [_row(name, count, sorted(sizes), times) for count in sorted(threads) for name in descriptors]
     path = context.out / "table2.png"
-    save_figure(path, times_figure({name: _seconds(name, min(threads), times) for name in descriptors}))
+    save_figure(path, times_figure({label(name): _seconds(name, min(threads), times) for name in descriptors}))
     shown = ("descriptor", "threads", *map(str, sorted(sizes)), "exponent", "to acd", "paper to acd")
     title = "Seconds of a descriptor from mesh to values by number of vertices, medians, nothing kept from before."
     return Findings("table2", title, shown, rows, _notes(meshes, repeats, times), (path,))
@@ -130,13 +131,16 @@ def times_figure(seconds: Mapping[str, Mapping[int, float]]) -> Figure:
     figure, axes = new_figure(6.6, 4.4)
     for k, (name, by_size) in enumerate(seconds.items()):
         slope = exponent(list(by_size), list(by_size.values()))
-        label = name if slope is None else f"{name} (N^{slope:.1f})"
-        axes.plot(list(by_size), list(by_size.values()), marker="o", markersize=4, label=label, **line_style(k))
+        text = name if slope is None else rf"{name} $\sim N^{{{slope:.1f}}}$"
+        axes.plot(list(by_size), list(by_size.values()), marker="o", markersize=4, label=text, **line_style(k))
     axes.set_xscale("log")
     axes.set_yscale("log")
     sizes = sorted({size for by_size in seconds.values() for size in by_size})
     axes.set_xticks(sizes, [f"{size:,}" for size in sizes])
-    axes.minorticks_off()
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.yaxis.set_major_locator(LogLocator(10, (1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axes.yaxis.set_minor_locator(NullLocator())
     axes.set_xlabel("vertices N")
     axes.set_ylabel("seconds")
     figure.legend(loc="outside right center", frameon=False)

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from csm.descriptors import ACD, HKS, WKS, Descriptor
-from csm.descriptors.base import as_operators
+from csm.descriptors import ACD, GPS, HKS, SHOT, SMWD, WEDS, WKS, Descriptor, Stack
+from csm.descriptors.base import as_operators, eigenpairs
 from csm.operators import Operators
 from tests.shapes import blob, rotation
 
@@ -86,3 +86,23 @@ def test_operators_are_used_as_they_are():
     operators = Operators(blob(2), unit_area=False)
     assert as_operators(operators) is operators
     assert as_operators(blob(2)).mesh.area == pytest.approx(1)
+
+
+ASKING = [
+    ACD(angles=4, k=10),
+    HKS(k=40),
+    SMWD(k=20),
+    WEDS(k=50),
+    GPS(k=7),
+    SHOT(),
+    Stack({"a": GPS(k=7), "b": HKS(k=9)}),
+]
+
+
+@pytest.mark.parametrize("descriptor", ASKING, ids=lambda descriptor: descriptor.name)
+def test_a_descriptor_says_how_many_eigenpairs_it_asks_for(descriptor, monkeypatch):
+    asked = [0]
+    solve = Operators._solve
+    monkeypatch.setattr(Operators, "_solve", lambda self, matrix, k: asked.append(k) or solve(self, matrix, k))
+    descriptor(blob(3))
+    assert max(asked) == eigenpairs(descriptor)

@@ -107,4 +107,4 @@ def test_the_picture_has_logarithmic_axes_and_a_tick_per_size():
     (axes,) = figure.axes
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
     assert [text.get_text() for text in axes.get_xticklabels()] == ["1,000", "2,000"]
-    assert [line.get_label() for line in axes.get_lines()] == ["a (N^2.0)", "b"]
+    assert [line.get_label() for line in axes.get_lines()] == [r"a $\sim N^{2.0}$", "b"]
