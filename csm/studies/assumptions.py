@@ -38,13 +38,13 @@ _FROM_THE_END = (  # 80 of 100, counted from the other end
 VARIANTS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "wft": {
         "columns over area": {"normalise": "area"},
-        "splines centred": {"spline_shift": -2.0},
+        "splines centred": {"spline_shift": 2.0},
         "kernels counted from the end": {"functions": _FROM_THE_END},
         "K = 100": {"k": 100},
         "K = 300": {"k": 300},
         "geometry vectors only": {"functions": ("geovec1", "geovec3", "geovec4", "geovec5", "geovec6")},
     },
-    "awft": {"columns over area": {"normalise": "area"}, "splines centred": {"spline_shift": -2.0}},
+    "awft": {"columns over area": {"normalise": "area"}, "splines centred": {"spline_shift": 2.0}},
     "asmwd": {"K = 300": {"k": 300}},
     "smwd": {
         "Mexican hats": {"variant": "mexican"},
