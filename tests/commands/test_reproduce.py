@@ -36,7 +36,7 @@ def test_words_are_studies_and_each_leaves_its_files(run, tmp_path, capsys):
     write_faust(tmp_path / "data" / "FAUST")
     options = ["table1.sets=[faust]", "table1.descriptors=[acd_paper]", "table1.exact_points=10", "workers=1"]
     run("reproduce", "table1", *options, "figure4", "results=shown", "hydra.run.dir=job")
-    files = {"table1.json", "table1.csv", "table1.md", "figure4.json", "figure4.csv", "figure4.md", "figure4.png"}
+    files = {f"{name}.{suffix}" for name in ("table1", "figure4") for suffix in ("json", "csv", "md", "png")}
     assert files <= {path.name for path in (tmp_path / "outputs/reproduce").iterdir()}
     assert files == {path.name for path in (tmp_path / "shown").iterdir()}
     record = json.loads((tmp_path / "shown/table1.json").read_text())
