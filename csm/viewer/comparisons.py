@@ -35,7 +35,8 @@ def dots_figure(names: Sequence[str], panels: Mapping[str, Mapping[str, Sequence
     wrong = [c for conditions in panels.values() for c, values in conditions.items() if len(values) != len(names)]
     if not names or not panels or wrong:
         raise ConfigError(f"dots figure: {wrong or 'nothing'} to draw; wanted {len(names)} values per condition")
-    figure = Figure(figsize=(1.2 + 2.9 * len(panels), 1.2 + 0.24 * len(names)), layout="constrained")
+    width = 0.4 + 0.075 * max(len(name) for name in names) + 2.9 * len(panels)
+    figure = Figure(figsize=(width, 1.2 + 0.24 * len(names)), layout="constrained")
     FigureCanvasAgg(figure)
     grid = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
     heights = np.arange(len(names))
