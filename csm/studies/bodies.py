@@ -78,6 +78,21 @@ class Bodies:
         shape = self.original.load(self.body)
         return {f"{shape.mesh.n_vertices:,} vertices": self.original, **self.others}
 
+    @property
+    def corresponding(self) -> dict[str, ShapeSet]:
+        """Those of the other triangulations whose vertices are known on the same template; the rest is warned of."""
+        template = self.original.load(self.body).truth.as_template_to_shape().n_from
+        found = {}
+        for title, shapes in self.others.items():
+            n = shapes.load(self.body).truth.as_template_to_shape().n_from
+            if n == template:
+                found[title] = shapes
+            else:
+                _log.warning(
+                    "%s (%s): its template has %d points, not %d, so it is left out", shapes.name, title, n, template
+                )
+        return found
+
 
 def built_in_bodies(store: Store) -> Bodies:
     """Return the built-in humans, refined to 10,000 and 15,000 vertices and remeshed to 5,000."""

@@ -94,7 +94,7 @@ def _shapes(bodies: Bodies) -> dict[str, Shape]:
         "other pose": bodies.original.load(bodies.other_pose),
         "other person": bodies.original.load(bodies.other_person),
     }
-    for title, shapes in list(bodies.others.items())[-2:]:
+    for title, shapes in list(bodies.corresponding.items())[-2:]:
         found[title] = shapes.load(bodies.body)
     return found
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from csm._types import Float32Array, IntArray
 from csm.data.shapeset import Shape
+from csm.errors import DataError
 from csm.evaluation.distances import MatchedPoints, target_errors
 from csm.evaluation.matching import nearest
 from csm.mesh.correspondence import GroundTruth, ground_truth
@@ -46,12 +47,20 @@ def run(
         How many corresponding points are matched, drawn without replacement; changes are measured at all.
     distance
         Kind of geodesic distance of the errors.
+
+    Raises
+    ------
+    DataError
+        If there is no other triangulation over the same template.
     """
     bodies = find_bodies(source, context)
+    others = bodies.corresponding
+    if not others:
+        raise DataError(f"stability: no other triangulation of {bodies.title} has the same template")
     original = bodies.original.load(bodies.body)
     here = describe(original.mesh, descriptors, context.store)
     table: dict[tuple[str, str], dict[str, Any]] = {}
-    for title, shapes in bodies.others.items():
+    for title, shapes in others.items():
         other = shapes.load(bodies.body)
         there = describe(other.mesh, descriptors, context.store)
         pairs = ground_truth(original.truth, other.truth)
@@ -65,9 +74,9 @@ def run(
         measured = target_errors(other.mesh, distance, "diameter", matched)
         for name, errors in zip(descriptors, measured.errors, strict=True):
             table[name, title]["error"] = 1000 * float(errors.distance.mean()) / measured.lengths.diameter
-    rows = [table[name, title] for name in descriptors for title in bodies.others]
+    rows = [table[name, title] for name in descriptors for title in others]
     path = context.out / "stability.png"
-    _draw(rows, [label(name) for name in descriptors], list(bodies.others), path)
+    _draw(rows, [label(name) for name in descriptors], list(others), path)
     title = f"Descriptors of one point of one shape in two triangulations ({bodies.title}, {bodies.body})."
     return Findings("stability", title, ("descriptor", "mesh", *_QUANTITIES), rows, _notes(original, points), (path,))
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
+from csm.data.shapeset import Shape
 from csm.descriptors.presets import preset
 from csm.errors import ConfigError, DataError
+from csm.mesh.correspondence import PointMap
 from csm.studies.bodies import (
     RIVALS,
     built_in_bodies,
@@ -18,7 +20,7 @@ from csm.studies.bodies import (
     label,
     landmark_vertices,
 )
-from tests.studies.toys import toy_bodies, toy_context
+from tests.studies.toys import Toys, toy_bodies, toy_context
 
 
 def test_without_data_the_built_in_humans_are_taken(tmp_path):
@@ -83,3 +85,19 @@ def test_faust_is_found_with_its_other_triangulations(data_set):
     assert up[at["head"]] > up.min() + 0.97 * np.ptp(up)
     assert 0.2 < (up[at["left knee"]] - up.min()) / np.ptp(up) < 0.35
     assert right[at["left knee"]] > right[[at["head"]]]
+
+
+@dataclass(frozen=True)
+class OnAnotherTemplate(Toys):
+    """The toys, whose points are counted on a template of 100 points."""
+
+    def load(self, name):
+        shape = super().load(name)
+        return Shape(shape.mesh, PointMap.identity(100, shape.mesh.n_vertices))
+
+
+def test_triangulations_over_another_template_do_not_correspond(caplog):
+    others = {"same": Toys(n_vertices=300), "other": OnAnotherTemplate(n_vertices=300)}
+    bodies = replace(toy_bodies(), others=others)
+    assert list(bodies.corresponding) == ["same"]
+    assert "its template has 100 points, not 162" in caplog.text

@@ -3,7 +3,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from csm.errors import DataError
 from csm.studies import stability
 from tests.studies.toys import Toys, toy_bodies, toy_context
 
@@ -24,6 +26,11 @@ def test_another_resolution_changes_a_little_and_is_told_for_each_descriptor(tmp
         assert 0 < row["contrast"] < 1
         assert 0 < row["error"] < 500
     assert found.pictures[0].is_file()
+
+
+def test_without_a_triangulation_over_the_same_template_nothing_can_be_compared(tmp_path):
+    with pytest.raises(DataError, match="toys has the same template"):
+        stability.run(toy_context(tmp_path), source=replace(toy_bodies(), others={}))
 
 
 def _constant(mesh, names, store):
