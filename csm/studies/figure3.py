@@ -89,7 +89,8 @@ def run(
     ]
     path = context.out / "figure3.png"
     save_figure(
-        path, sweeps_figure([_sweep(name, rows, centre) for name in sweeps], "mean error (thousandths of the diameter)")
+        path,
+        sweeps_figure([_sweep(name, rows, centre) for name in sweeps], "mean error (thousandths\nof the diameter)"),
     )
     title = f"Error of nearest-neighbour matching by ACD over its parameters, others as in {base} ({shapes.name})."
     shown = ("parameter", "value", "columns", "error", "standard error")
