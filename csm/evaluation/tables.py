@@ -53,12 +53,12 @@ def markdown_table(rows: Sequence[ResultRow]) -> str:
 
 
 def paper_table(rows: Sequence[ResultRow], published: Published) -> str:
-    """Return the paper's errors beside ours: per method a line from the paper and a line of ours, one column per test.
+    """Return the paper's errors beside ours: per method a line from the paper, where it has the method, and one of ours.
 
     Parameters
     ----------
     rows
-        Of one distance and normaliser, at most one per method and test.
+        Of one distance and normaliser, at most one per method and test; there is one column per test.
     published
         The paper's error, as a fraction of the normaliser, for (method, test); a pair that is absent is printed as "-".
 
@@ -77,8 +77,9 @@ def paper_table(rows: Sequence[ResultRow], published: Published) -> str:
     methods, tests = (list(dict.fromkeys(key[i] for key in cells)) for i in (0, 1))
     lines = []
     for method in methods:
-        paper = [_optional(published.get((method, test)), 1000) for test in tests]
-        lines.append((method, "paper", *paper))
+        paper = [published.get((method, test)) for test in tests]
+        if any(value is not None for value in paper):
+            lines.append((method, "paper", *(_optional(value, 1000) for value in paper)))
         lines.append((method, "ours", *(cells.get((method, test), "-") for test in tests)))
     distance, normaliser = kinds.pop()
     return _markdown([f"AGE x1000 {_NORMALISERS[normaliser]}, {distance}", "", *tests], lines)
