@@ -53,7 +53,7 @@ def markdown_table(rows: Sequence[ResultRow]) -> str:
 
 
 def paper_table(rows: Sequence[ResultRow], published: Published) -> str:
-    """Return the paper's errors beside ours: per method a line from the paper, where it has the method, and one of ours.
+    """Return the paper's errors beside ours: per method a line of the paper, if it has the method, and one of ours.
 
     Parameters
     ----------
