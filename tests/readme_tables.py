@@ -24,10 +24,13 @@ PUBLISHED: Published = {(m, test): age / 1000 for m, ages in LEARNED_AGE.items()
 
 def tables(rows: list[ResultRow]) -> str:
     """Return the paper's errors beside ours, then our rows with their protocol."""
-    protocols: dict[str, list[str]] = {}
+    protocols: dict[str, list[ResultRow]] = {}
     for row in rows:
-        protocols.setdefault(row.protocol, []).append(row.test)
-    lines = [f"{', '.join(dict.fromkeys(tests))}: {protocol}" for protocol, tests in protocols.items()]
+        protocols.setdefault(row.protocol, []).append(row)
+    lines = []
+    for protocol, measured in protocols.items():
+        tests, methods = (", ".join(dict.fromkeys(getattr(row, key) for row in measured)) for key in ("test", "method"))
+        lines.append(f"{tests}{f' ({methods})' if len(protocols) > 1 else ''}: {protocol}")
     return f"{paper_table(rows, PUBLISHED)}\n{markdown_table(rows)}\n" + "\n\n".join(lines) + "\n"
 
 
