@@ -31,6 +31,7 @@ from csm.studies.study import Context, Findings
 from csm.viewer.comparisons import Sweep, sweeps_figure
 from csm.viewer.figures import save_figure
 
+QUANTITY = "mean error (thousandths\nof the diameter)"
 LABELS = {"alpha": "strength α", "angles": "angles J", "k": "eigenpairs K", "order": "order D"}
 
 
@@ -88,10 +89,7 @@ def run(
         for value, setting in zip(sorted(values), wanted[name], strict=True)
     ]
     path = context.out / "figure3.png"
-    save_figure(
-        path,
-        sweeps_figure([_sweep(name, rows, centre) for name in sweeps], "mean error (thousandths\nof the diameter)"),
-    )
+    save_figure(path, sweeps_figure([_sweep(name, rows, centre) for name in sweeps], QUANTITY))
     title = f"Error of nearest-neighbour matching by ACD over its parameters, others as in {base} ({shapes.name})."
     shown = ("parameter", "value", "columns", "error", "standard error")
     return Findings("figure3", title, shown, rows, _notes(couples, points, distance), (path,))
