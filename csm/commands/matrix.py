@@ -118,19 +118,20 @@ class Cells:
             With the entries that differ.
         """
         path, wanted = self.folder / "row.json", training_of(self.train_cfg)
-        if path.exists():
-            kept = json.loads(path.read_text(encoding="utf-8"))
-            changed = [
-                f"{key}: {kept.get(key)} there, {wanted.get(key)} wanted"
-                for key in sorted({*kept, *wanted})
-                if kept.get(key) != wanted.get(key)
-            ]
-            if changed:
-                raise ConfigError(
-                    f"{self.folder} was trained otherwise ({'; '.join(changed)}); call the row otherwise, choose "
-                    "another folder=, or remove that one"
-                )
-        write_json(path, wanted)
+        if not path.exists():
+            write_json(path, wanted)
+            return
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        changed = [
+            f"{key}: {kept.get(key)} there, {wanted.get(key)} wanted"
+            for key in sorted({*kept, *wanted})
+            if kept.get(key) != wanted.get(key)
+        ]
+        if changed:
+            raise ConfigError(
+                f"{self.folder} was trained otherwise ({'; '.join(changed)}); call the row otherwise, choose "
+                "another folder=, or remove that one"
+            )
 
     def fill(self) -> list[ResultRow]:
         """Return the row of every test set, from its file where that answers the same question."""

@@ -13,27 +13,19 @@ from csm._types import FloatArray
 from csm.data.shapeset import ShapeSet
 from csm.descriptors.base import Descriptor
 from csm.descriptors.presets import preset
+from csm.descriptors.wft import WFT
 from csm.errors import ConfigError
 from csm.operators.geodesic import Method
 from csm.studies.bodies import label
-from csm.studies.couples import PERSONS, Task, measure, same_person_couples, training_shapes
+from csm.studies.couples import PERSONS, averaged, training_errors, training_shapes
 from csm.studies.published import AGE, family
 from csm.studies.study import Context, Findings
 from csm.viewer.comparisons import dots_figure
 from csm.viewer.figures import save_figure
 
-_FROM_THE_END = (  # 80 of 100, counted from the other end
-    "geovec1",
-    "geovec3",
-    "geovec4",
-    "geovec5",
-    "geovec6",
-    "constant",
-    "fiedler",
-    "shape_index",
-    "hks21",
-    "wks21",
-)
+_FUNCTIONS = WFT().functions
+_FROM_THE_END = tuple(name.replace("80", "21") for name in _FUNCTIONS)
+"""Heat and wave signature 80 of 100 counted from the other end."""
 
 VARIANTS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "wft": {
@@ -42,7 +34,7 @@ VARIANTS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "kernels counted from the end": {"functions": _FROM_THE_END},
         "K = 100": {"k": 100},
         "K = 300": {"k": 300},
-        "geometry vectors only": {"functions": ("geovec1", "geovec3", "geovec4", "geovec5", "geovec6")},
+        "geometry vectors only": {"functions": tuple(name for name in _FUNCTIONS if name.startswith("geovec"))},
     },
     "awft": {"columns over area": {"normalise": "area"}, "splines centred": {"spline_shift": 2.0}},
     "asmwd": {"K = 300": {"k": 300}},
@@ -110,11 +102,12 @@ def run(
     if unknown or not descriptors:
         raise ConfigError(f"assumptions: {', '.join(unknown) or 'nothing'} to vary; there is {', '.join(VARIANTS)}")
     shapes = shapes or training_shapes(context)
-    couples = same_person_couples(shapes.names, n_pairs, context.seed)
-    tasks = [Task(shapes, pair, context.out / "assumptions", points, context.seed, distance) for pair in couples]
     wanted = {(name, title): d for name in descriptors for title, d in variants_of(name).items()}
-    errors = measure(tasks, list(dict.fromkeys(wanted.values())), context.workers)
-    rows = [_row(name, title, 1000 * errors[descriptor]) for (name, title), descriptor in wanted.items()]
+    settings = list(wanted.values())
+    errors = training_errors(
+        context, shapes, settings, "assumptions", n_pairs=n_pairs, points=points, distance=distance
+    )
+    rows = [_row(name, title, errors[descriptor]) for (name, title), descriptor in wanted.items()]
     names = [f"{label(name)}: {title}" if title != AS_IN_TABLE else label(name) for name, title in wanted]
     path = context.out / "assumptions.png"
     save_figure(path, dots_figure(names, {_QUANTITY: {"": [row["error"] for row in rows]}}))
@@ -142,7 +135,5 @@ def _row(name: str, title: str, errors: FloatArray) -> dict[str, Any]:
         "descriptor": name,
         "variant": title,
         "paper": AGE[family(name)]["faust"],
-        "error": float(errors.mean()),
-        "standard error": float(errors.std(ddof=1) / len(errors) ** 0.5),
-        "pairs": errors.tolist(),
+        **averaged(errors),
     }

@@ -16,7 +16,7 @@ from csm._types import FloatArray
 from csm.data.datasets import find_set
 from csm.data.humansset import HumansSet
 from csm.data.shapeset import Shape, ShapeSet
-from csm.descriptors.base import Descriptor, record
+from csm.descriptors.base import Descriptor, eigenpairs, record
 from csm.errors import ConfigError, DataError
 from csm.evaluation.distances import MatchedPoints, target_errors
 from csm.evaluation.matching import nearest
@@ -103,9 +103,7 @@ def couple_errors(first: Shape, second: Shape, settings: Sequence[Descriptor], t
     operators = Operators(first.mesh), Operators(second.mesh)
     onto_first: dict[Descriptor, MatchedPoints] = {}
     onto_second: dict[Descriptor, MatchedPoints] = {}
-    for setting in sorted(
-        settings, key=lambda s: getattr(s, "k", 0), reverse=True
-    ):  # longer spectra serve the shorter ones
+    for setting in sorted(settings, key=eigenpairs, reverse=True):  # the longest spectrum serves the others
         here, there = (setting(shape).values.astype(np.float32) for shape in operators)
         onto_second[setting] = MatchedPoints(points[1], nearest(here[points[0]], there))
         onto_first[setting] = MatchedPoints(points[0], nearest(there[points[1]], here))
@@ -114,6 +112,35 @@ def couple_errors(first: Shape, second: Shape, settings: Sequence[Descriptor], t
         for mesh, matched in ((second.mesh, onto_second), (first.mesh, onto_first))
     ]
     return np.array([[p.distance.mean() / e.lengths.diameter for p in e.errors] for e in errors]).T
+
+
+def training_errors(
+    context: Context,
+    shapes: ShapeSet,
+    settings: Sequence[Descriptor],
+    folder: str,
+    *,
+    n_pairs: int,
+    points: int,
+    distance: Method,
+) -> dict[Descriptor, FloatArray]:
+    """Return the errors of each descriptor over pairs of `same_person_couples`, (n_pairs,), in thousandths.
+
+    What was measured of a couple is kept in `folder`, below that of the artefacts.
+    """
+    couples = same_person_couples(shapes.names, n_pairs, context.seed)
+    tasks = [Task(shapes, pair, context.out / folder, points, context.seed, distance) for pair in couples]
+    errors = measure(tasks, list(dict.fromkeys(settings)), context.workers)
+    return {setting: 1000 * values for setting, values in errors.items()}
+
+
+def averaged(errors: FloatArray) -> dict[str, Any]:
+    """Return what a row of a table says of errors over pairs: their mean, its standard error, and themselves."""
+    return {
+        "error": float(errors.mean()),
+        "standard error": float(errors.std(ddof=1) / np.sqrt(len(errors))),
+        "pairs": errors.tolist(),
+    }
 
 
 def measure(tasks: Sequence[Task], settings: Sequence[Descriptor], workers: int) -> dict[Descriptor, FloatArray]:

@@ -26,7 +26,7 @@ from csm.descriptors.chebyshev import ACD
 from csm.descriptors.presets import preset
 from csm.errors import ConfigError
 from csm.operators.geodesic import Method
-from csm.studies.couples import PERSONS, Task, measure, same_person_couples, training_shapes
+from csm.studies.couples import PERSONS, averaged, training_errors, training_shapes
 from csm.studies.study import Context, Findings
 from csm.viewer.comparisons import Sweep, sweeps_figure
 from csm.viewer.figures import save_figure
@@ -78,13 +78,10 @@ def run(
         raise ConfigError(f"figure3: {base} is not a preset of ACD, whose parameters are studied")
     wanted = {name: [vary(centre, name, value) for value in sorted(values)] for name, values in sweeps.items()}
     shapes = shapes or training_shapes(context)
-    couples = same_person_couples(shapes.names, n_pairs, context.seed)
-    folder = context.out / "figure3"
-    settings = list(dict.fromkeys(setting for values in wanted.values() for setting in values))
-    tasks = [Task(shapes, couple, folder, points, context.seed, distance) for couple in couples]
-    errors = measure(tasks, settings, context.workers)
+    settings = [setting for values in wanted.values() for setting in values]
+    errors = training_errors(context, shapes, settings, "figure3", n_pairs=n_pairs, points=points, distance=distance)
     rows = [
-        _row(name, value, setting, 1000 * errors[setting])
+        _row(name, value, setting, errors[setting])
         for name, values in sweeps.items()
         for value, setting in zip(sorted(values), wanted[name], strict=True)
     ]
@@ -92,7 +89,7 @@ def run(
     save_figure(path, sweeps_figure([_sweep(name, rows, centre) for name in sweeps], QUANTITY))
     title = f"Error of nearest-neighbour matching by ACD over its parameters, others as in {base} ({shapes.name})."
     shown = ("parameter", "value", "columns", "error", "standard error")
-    return Findings("figure3", title, shown, rows, _notes(couples, points, distance), (path,))
+    return Findings("figure3", title, shown, rows, _notes(n_pairs, points, distance), (path,))
 
 
 def vary(centre: ACD, name: str, value: float) -> ACD:
@@ -109,9 +106,7 @@ def _row(name: str, value: float, setting: ACD, errors: FloatArray) -> dict[str,
         "parameter": name,
         "value": value,
         "columns": len(setting.columns),
-        "error": float(errors.mean()),
-        "standard error": float(errors.std(ddof=1) / np.sqrt(len(errors))),
-        "pairs": errors.tolist(),
+        **averaged(errors),
     }
 
 
@@ -126,9 +121,9 @@ def _sweep(name: str, rows: Sequence[dict[str, Any]], centre: ACD) -> Sweep:
     )
 
 
-def _notes(couples: Sequence[tuple[str, str]], points: int, distance: str) -> tuple[str, ...]:
+def _notes(n_pairs: int, points: int, distance: str) -> tuple[str, ...]:
     return (
-        f"error: mean over {2 * len(couples)} ordered pairs of {points} points each, in thousandths of the target's "
+        f"error: mean over {n_pairs} ordered pairs of {points} points each, in thousandths of the target's "
         f"geodesic diameter ({distance} distances); bars: one standard error over pairs.",
         f"Pairs: two poses of one of the first {PERSONS} persons, both ways; no test shape is used.",
         "At alpha 0 all angles give the same numbers, so a single one is used.",

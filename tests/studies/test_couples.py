@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from csm.descriptors.chebyshev import ACD
+from csm.descriptors import ACD, SMWD, WEDS
 from csm.errors import ConfigError
 from csm.studies import couples
 from csm.studies.couples import Task, couple_errors, same_person_couples
@@ -68,3 +68,12 @@ def test_couples_are_two_poses_of_one_training_person():
     for wrong in (0, 3, 82):
         with pytest.raises(ConfigError, match="from 2 to 80"):
             same_person_couples(names, wrong, seed=0)
+
+
+def test_one_spectrum_serves_all_whatever_they_call_their_number_of_eigenpairs(task, monkeypatch):
+    shapes = [Toys().load(name) for name in ("toy0", "toy1")]
+    solved: list[int] = []
+    solve = couples.Operators._solve
+    monkeypatch.setattr(couples.Operators, "_solve", lambda self, m, k: solved.append(k) or solve(self, m, k))
+    couple_errors(*shapes, [SMWD(k=20), WEDS(k=20)], task)
+    assert solved == [21, 21]
