@@ -165,9 +165,10 @@ def reach(evecs: Float32Array, responses: Float32Array, patch: IntArray, toleran
 
 def fourth_powers(evecs: Float32Array, response: Float32Array, patch: IntArray) -> Float32Array:
     """Return the columns `patch` of the operator G of one wavelet, each with sum 1 (or 0 throughout)."""
-    powers: Float32Array = evecs @ (evecs[patch] * response).T
+    used = slice(0, 1 + int(np.flatnonzero(response).max(initial=-1)))
+    powers: Float32Array = evecs[:, used] @ (evecs[patch, used] * response[used]).T
     powers *= powers
-    powers[powers < 1e-15] = 0  # rounding, and denormal when squared
+    powers *= powers >= 1e-15  # less is rounding, and denormal when squared
     powers *= powers
     sums = powers.sum(axis=0)
     powers /= np.where(sums > 0, sums, np.float32(1))
