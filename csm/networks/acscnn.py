@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import itertools
-import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import torch
 from torch import Tensor, nn
-from torch.autograd.function import once_differentiable
 
+from csm.networks.sparse import chebyshev_filter, symmetric_matrix
 from csm.networks.surface import Surface
 
 
@@ -65,8 +64,7 @@ class ACSConv(nn.Module):
         """
         terms, _, fan_out = self.weight.shape
         weight = self.weight.view(terms, self.angles, -1, fan_out)
-        y: Tensor = _AngularFilter.apply(root_mass * x, weight, laplacians)  # type: ignore[no-untyped-call]
-        return y / root_mass + self.bias
+        return chebyshev_filter(root_mass * x, weight, laplacians) / root_mass + self.bias
 
     def extra_repr(self) -> str:
         """Show the sizes when the module is printed."""
@@ -156,56 +154,5 @@ class ACSCNN(nn.Module):
 
 def laplacians_of(surface: Surface) -> tuple[Tensor, ...]:
     """Return the stencil "albo" as sparse tensors, (N, N) each and symmetric, one per angle."""
-    stencil, size = surface.stencil("albo"), (surface.n_vertices, surface.n_vertices)
-    indptr, indices = stencil["indptr"].int(), stencil["indices"].int()  # the kernels' own type
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Sparse CSR tensor support is in beta", UserWarning)
-        return tuple(
-            torch.sparse_csr_tensor(indptr, indices, values, size, check_invariants=False)
-            for values in stencil["values"]
-        )
-
-
-class _AngularFilter(torch.autograd.Function):
-    """Sum over angles and terms of T_k(M_j) x W_kj, for symmetric M_j.
-
-    The gradients with respect to x and W_kj are the sum of V_kj W_kj^T and x^T V_kj with V_kj = T_k(M_j) dy, so one
-    recursion serves both, and only x and the weights are kept for it.  One angle at a time stays in the cache.
-    """
-
-    @staticmethod
-    def forward(ctx: Any, x: Tensor, weight: Tensor, laplacians: Sequence[Tensor]) -> Tensor:
-        ctx.save_for_backward(x, weight)
-        ctx.laplacians = laplacians
-        y = x @ weight[0].sum(0)
-        for j, laplacian in enumerate(laplacians):
-            for k, function in enumerate(_polynomials(laplacian, x, len(weight)), 1):
-                y.addmm_(function, weight[k, j])
-        return y
-
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, dy: Tensor) -> tuple[Tensor | None, ...]:
-        x, weight = ctx.saved_tensors
-        dw = torch.empty_like(weight)
-        dw[0] = x.T @ dy
-        dx = dy @ weight[0].sum(0).T if ctx.needs_input_grad[0] else None
-        for j, laplacian in enumerate(ctx.laplacians):
-            for k, function in enumerate(_polynomials(laplacian, dy, len(weight)), 1):
-                torch.mm(x.T, function, out=dw[k, j])
-                if dx is not None:
-                    dx.addmm_(function, weight[k, j].T)
-        return dx, dw, None
-
-
-def _polynomials(laplacian: Tensor, x: Tensor, terms: int) -> Iterator[Tensor]:
-    """Yield T_1(M) x .. T_{terms-1}(M) x, shape (N, C) each; what is yielded next but one overwrites it."""
-    if terms < 2:
-        return
-    before = x.clone(memory_format=torch.contiguous_format)
-    now = torch.addmm(before, laplacian, before, beta=0)
-    yield now
-    for _ in range(2, terms):
-        torch.addmm(before, laplacian, now, beta=-1, alpha=2, out=before)
-        before, now = now, before
-        yield now
+    stencil = surface.stencil("albo")
+    return tuple(symmetric_matrix(stencil["indptr"], stencil["indices"], values) for values in stencil["values"])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import torch
@@ -11,7 +11,7 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from csm.networks.csmconv import reset_terms
-from csm.networks.sparse import chebyshev_filter
+from csm.networks.sparse import chebyshev_filter, symmetric_matrix
 from csm.networks.surface import Surface
 
 
@@ -73,15 +73,21 @@ class ChebyNet(nn.Module):
 
     def describe(self, x: Tensor, surface: Surface) -> Tensor:
         """Return the learned descriptor, shape (N, descriptor_channels), of input features `x`, shape (N, P)."""
-        stencil = surface.stencil("scaled_laplacian")
+        laplacian = laplacian_of(surface, x.dtype)
         for conv in self.convs:
-            x = F.elu(conv(x, stencil))
+            x = F.elu(conv(x, laplacian))
         return F.elu(self.embed(x))
 
     def forward(self, x: Tensor, surface: Surface) -> Tensor:
         """Return the logits over the template vertices, shape (N, n_classes)."""
         y: Tensor = self.classifier(self.dropout(self.describe(x, surface)))
         return y
+
+
+def laplacian_of(surface: Surface, dtype: torch.dtype) -> Tensor:
+    """Return the stencil "scaled_laplacian" as a sparse tensor, (N, N) and symmetric."""
+    stencil = surface.stencil("scaled_laplacian")
+    return symmetric_matrix(stencil["indptr"], stencil["indices"], stencil["values"].to(dtype))
 
 
 class ChebConv(nn.Module):
@@ -111,9 +117,9 @@ class ChebConv(nn.Module):
         """Draw the weights Xavier-uniformly with the fan of all terms together, and set the bias to zero."""
         reset_terms(self.weight, self.bias)
 
-    def forward(self, x: Tensor, stencil: Mapping[str, Tensor]) -> Tensor:
-        """Convolve the functions `x`, shape (N, C_in), with these arrays of `ScaledLaplacian`."""
-        return chebyshev_filter(stencil["indptr"], stencil["indices"], stencil["values"], x, self.weight) + self.bias
+    def forward(self, x: Tensor, laplacian: Tensor) -> Tensor:
+        """Convolve the functions `x`, shape (N, C_in), with the matrix of `laplacian_of`."""
+        return chebyshev_filter(x, self.weight[:, None], (laplacian,)) + self.bias
 
     def extra_repr(self) -> str:
         """Show the sizes when the module is printed."""

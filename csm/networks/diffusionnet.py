@@ -172,5 +172,5 @@ class Gradient:
 
     def __call__(self, x: Tensor) -> tuple[Tensor, Tensor]:
         """Return the components, shape (N, C) each."""
-        gx, gy = (spmm(*matrix, x, back) for matrix, back in zip(self.components, self.transposed, strict=True))
+        gx, gy = (spmm(matrix, x, back) for matrix, back in zip(self.components, self.transposed, strict=True))
         return gx, gy

@@ -1,12 +1,12 @@
 """Products with sparse matrices that do not learn, and filters that are polynomials of them.
 
-A matrix is three tensors in CSR form, as stencils have it: `indptr` (N + 1,), `indices` (nnz,) and `values` (nnz,).
-Its gradient is never wanted; that of what it is multiplied with is made with the transposed matrix.
+The gradient of a matrix is never wanted; that of what it is multiplied with is made with the transposed matrix.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import warnings
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import torch
@@ -34,79 +34,62 @@ class Csr(NamedTuple):
         )
 
 
-def spmm(
-    indptr: Tensor,
-    indices: Tensor,
-    values: Tensor,
-    x: Tensor,
-    transposed: tuple[Tensor, Tensor, Tensor] | None = None,
-) -> Tensor:
-    """Multiply a sparse matrix with `x`; the gradient goes to `x` alone.
+def spmm(matrix: Csr, x: Tensor, transposed: Csr) -> Tensor:
+    """Multiply a sparse matrix, shape (N, M), with `x`, shape (M, C); the gradient goes to `x` alone.
 
-    Parameters
-    ----------
-    indptr, indices, values
-        The matrix, shape (N, M).
-    x
-        Shape (M, C).
-    transposed
-        The same three of the transposed matrix; None if the matrix is symmetric.
-
-    Returns
-    -------
-    Tensor
-        Shape (N, C).
+    `transposed` is the same matrix with rows and columns exchanged, shape (M, N), which the gradient goes through.
     """
-    matrix = Csr(indptr, indices, values)
-    other = matrix if transposed is None else Csr(*transposed)
-    y: Tensor = _Product.apply(x, matrix, other)  # type: ignore[no-untyped-call]
+    y: Tensor = _Product.apply(x, matrix, transposed)  # type: ignore[no-untyped-call]
     return y
 
 
-def chebyshev_filter(
-    indptr: Tensor,
-    indices: Tensor,
-    values: Tensor,
-    x: Tensor,
-    weight: Tensor,
-    transposed: tuple[Tensor, Tensor, Tensor] | None = None,
-) -> Tensor:
-    r"""Return sum_k T_k(L) x W_k for the Chebyshev polynomials T_0 .. T_{K-1} of a square sparse matrix L.
+def symmetric_matrix(indptr: Tensor, indices: Tensor, values: Tensor) -> Tensor:
+    """Return a symmetric matrix in the form that `chebyshev_filter` wants: a sparse tensor, (N, N), of int32 indices.
 
-    With V_k = T_k(L^T) dy the gradients are sum_k V_k W_k^T and x^T V_k, so the backward pass makes one recursion, as
-    the forward pass does, and nothing but `x` and `weight` is kept in between.
+    With these the product that adds to what is there, of the recursion of Chebyshev polynomials, runs in the kernel;
+    it is twice as fast as `Csr.times` at 64 channels.
+    """
+    n = len(indptr) - 1
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Sparse CSR tensor support is in beta", UserWarning)
+        return torch.sparse_csr_tensor(indptr.int(), indices.int(), values, (n, n), check_invariants=False)
+
+
+def chebyshev_filter(x: Tensor, weight: Tensor, matrices: Sequence[Tensor]) -> Tensor:
+    r"""Return the sum over j and k of T_k(M_j) x W_kj, with the Chebyshev polynomials T_0 .. T_{K-1}.
+
+    With V_kj = T_k(M_j) dy the gradients are the sum of V_kj W_kj^T, and x^T V_kj, so the backward pass makes the
+    recursion of the forward pass, and nothing but `x` and `weight` is kept in between.  One matrix at a time stays in
+    the cache.
 
     Parameters
     ----------
-    indptr, indices, values
-        L, shape (N, N), with its spectrum in [-1, 1].
     x
         Shape (N, C_in).
     weight
-        Shape (K, C_in, C_out).
-    transposed
-        The arrays of L^T; None if L is symmetric.
+        Shape (K, J, C_in, C_out).
+    matrices
+        J symmetric matrices, (N, N), of `symmetric_matrix`, with their spectra in [-1, 1].
 
     Returns
     -------
     Tensor
         Shape (N, C_out).
     """
-    matrix = Csr(indptr, indices, values)
-    other = matrix if transposed is None else Csr(*transposed)
-    y: Tensor = _ChebyshevFilter.apply(x, weight, matrix, other)  # type: ignore[no-untyped-call]
+    y: Tensor = _ChebyshevFilter.apply(x, weight, matrices)  # type: ignore[no-untyped-call]
     return y
 
 
-def chebyshev_functions(matrix: Csr, x: Tensor, terms: int) -> Iterator[Tensor]:
-    """Yield T_0(L) x .. T_{terms-1}(L) x, shape (N, C) each, without gradients."""
-    before, now = x, x
-    twice = matrix._replace(values=2 * matrix.values)
-    for k in range(terms):
-        if k == 1:
-            now = matrix.times(x)
-        elif k > 1:
-            before, now = now, twice.times(now).sub_(before)
+def chebyshev_functions(matrix: Tensor, x: Tensor, terms: int) -> Iterator[Tensor]:
+    """Yield T_1(M) x .. T_{terms-1}(M) x, shape (N, C) each; what is yielded next but one overwrites it."""
+    if terms < 2:
+        return
+    before = x.clone(memory_format=torch.contiguous_format)
+    now = torch.addmm(before, matrix, before, beta=0)
+    yield now
+    for _ in range(2, terms):
+        torch.addmm(before, matrix, now, beta=-1, alpha=2, out=before)
+        before, now = now, before
         yield now
 
 
@@ -124,23 +107,25 @@ class _Product(torch.autograd.Function):
 
 class _ChebyshevFilter(torch.autograd.Function):
     @staticmethod
-    def forward(ctx: Any, x: Tensor, weight: Tensor, matrix: Csr, transposed: Csr) -> Tensor:
+    def forward(ctx: Any, x: Tensor, weight: Tensor, matrices: Sequence[Tensor]) -> Tensor:
         ctx.save_for_backward(x, weight)
-        ctx.transposed = transposed
-        y = x.new_zeros(len(x), weight.shape[2])
-        for function, w in zip(chebyshev_functions(matrix, x, len(weight)), weight, strict=True):
-            y.addmm_(function, w)
+        ctx.matrices = matrices
+        y = x @ weight[0].sum(0)
+        for j, matrix in enumerate(matrices):
+            for k, function in enumerate(chebyshev_functions(matrix, x, len(weight)), 1):
+                y.addmm_(function, weight[k, j])
         return y
 
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, dy: Tensor) -> tuple[Tensor | None, ...]:
         x, weight = ctx.saved_tensors
-        dx = torch.zeros_like(x) if ctx.needs_input_grad[0] else None
         dw = torch.empty_like(weight)
-        functions = chebyshev_functions(ctx.transposed, dy.contiguous(), len(weight))
-        for k, function in enumerate(functions):
-            torch.mm(x.T, function, out=dw[k])
-            if dx is not None:
-                dx.addmm_(function, weight[k].T)
-        return dx, dw, None, None
+        dw[0] = x.T @ dy
+        dx = dy @ weight[0].sum(0).T if ctx.needs_input_grad[0] else None
+        for j, matrix in enumerate(ctx.matrices):
+            for k, function in enumerate(chebyshev_functions(matrix, dy, len(weight)), 1):
+                torch.mm(x.T, function, out=dw[k, j])
+                if dx is not None:
+                    dx.addmm_(function, weight[k, j].T)
+        return dx, dw, None

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from csm.networks import ChebyNet, Surface
-from csm.networks.chebynet import ChebConv
+from csm.networks.chebynet import ChebConv, laplacian_of
 from csm.operators.laplacian import stiffness
 from csm.operators.scaledlaplacian import graph_laplacian
 from tests.shapes import blob
@@ -36,17 +36,17 @@ def test_against_cosines_of_the_dense_laplacian(laplacian, terms):
     expected = conv.bias + sum(
         evecs @ torch.diag(torch.cos(d * angle)) @ evecs.T @ x @ w for d, w in enumerate(conv.weight)
     )
-    y = conv(x, laplacian_surface(mesh, laplacian).stencil("scaled_laplacian"))
+    y = conv(x, laplacian_of(laplacian_surface(mesh, laplacian), torch.float64))
     torch.testing.assert_close(y, expected, atol=1e-4, rtol=1e-4)
 
 
 def test_gradients_in_float64():
     torch.manual_seed(0)
     mesh = blob(1)
-    stencil = laplacian_surface(mesh).stencil("scaled_laplacian")
+    laplacian = laplacian_of(laplacian_surface(mesh), torch.float64)
     conv = ChebConv(2, 3, 4).double()
     x = torch.randn(mesh.n_vertices, 2, dtype=torch.float64, requires_grad=True)
-    assert torch.autograd.gradcheck(lambda v, *_: conv(v, stencil), (x, *conv.parameters()))
+    assert torch.autograd.gradcheck(lambda v, *_: conv(v, laplacian), (x, *conv.parameters()))
 
 
 def test_a_convolution_of_k_terms_sees_k_less_one_rings():
@@ -56,7 +56,7 @@ def test_a_convolution_of_k_terms_sees_k_less_one_rings():
     impulse[7] = 1
     reached = (torch.linalg.matrix_power(adjacency, 2) @ impulse)[:, 0] > 0
     conv = ChebConv(1, 4, 3).double()
-    y = conv(impulse, laplacian_surface(mesh).stencil("scaled_laplacian"))
+    y = conv(impulse, laplacian_of(laplacian_surface(mesh), torch.float64))
     assert (y[~reached] == 0).all()
     assert (y[reached] != 0).all()
 
