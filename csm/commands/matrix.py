@@ -112,6 +112,8 @@ class Cells:
     def require_same_training(self) -> None:
         """Keep how the row is trained, or refuse what the folder holds if it was trained otherwise.
 
+        An option that is off and that the folder does not know of came with a later version and changes nothing.
+
         Raises
         ------
         ConfigError
@@ -125,7 +127,7 @@ class Cells:
         changed = [
             f"{key}: {kept.get(key)} there, {wanted.get(key)} wanted"
             for key in sorted({*kept, *wanted})
-            if kept.get(key) != wanted.get(key)
+            if kept.get(key) != wanted.get(key) and (key in kept or wanted[key])
         ]
         if changed:
             raise ConfigError(

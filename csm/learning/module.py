@@ -6,11 +6,13 @@ from typing import Any, Literal, cast
 
 import lightning as L
 import torch
+from scipy.spatial.transform import Rotation
 from torch import Tensor
 from torch.optim import Adam
 from torch.optim.lr_scheduler import CosineAnnealingLR, LRScheduler, OneCycleLR, StepLR
 
 from csm.data.datamodule import ShapeSample
+from csm.descriptors import Coordinates
 from csm.errors import ConfigError
 from csm.evaluation.matching import Votes, votes
 from csm.learning.loss import Products, linear_cross_entropy
@@ -50,6 +52,9 @@ class CSMModule(L.LightningModule):
         How many labelled vertices, drawn anew in every training step, the loss is taken over; None for all.  The
         classifier is most of the cost of a step, so 1024 of 6890 make it several times faster; the gradient is that
         of all vertices on average.
+    rotate
+        Turn the input features, which must be vertex positions (descriptor "xyz"), by a rotation drawn anew in every
+        training step, any as likely as any other, so that the network learns not to depend on how a shape stands.
     training
         How the checkpoint came about (data, split, seed), free plain data for its reader.
     """
@@ -66,6 +71,7 @@ class CSMModule(L.LightningModule):
         schedule: Schedule = "constant",
         loss_products: Products = "float32",
         loss_rows: int | None = None,
+        rotate: bool = False,
         training: dict[str, Any] | None = None,
         format: int = FORMAT,
     ) -> None:
@@ -88,7 +94,13 @@ class CSMModule(L.LightningModule):
         self.lr, self.weight_decay, self.schedule = lr, weight_decay, schedule
         if loss_rows is not None and loss_rows < 1:
             raise ConfigError(f"loss_rows={loss_rows}; wanted a number of vertices from 1, or none for all")
+        if rotate and descriptor.get("name") != Coordinates.name:
+            raise ConfigError(
+                f"optimizer.rotate turns vertex positions, and the input is {descriptor.get('name')!r}: set "
+                "descriptor=xyz, or leave rotate out, as the other descriptors do not turn with the shape"
+            )
         self.loss_products: Products = loss_products
+        self.rotate = rotate
         self.loss_rows = loss_rows
 
     @property
@@ -111,7 +123,10 @@ class CSMModule(L.LightningModule):
 
     def training_step(self, sample: ShapeSample) -> Tensor:
         """One shape: loss of its labelled vertices."""
-        loss = self.loss(self(sample.features, sample.surface), sample)
+        features = sample.features
+        if self.rotate:
+            features = features @ random_rotation().to(features)
+        loss = self.loss(self(features, sample.surface), sample)
         self.log("train/loss", loss, on_step=False, on_epoch=True, prog_bar=True, batch_size=1)
         return loss
 
@@ -163,3 +178,9 @@ class CSMModule(L.LightningModule):
             case "one_cycle":
                 return OneCycleLR(optimizer, self.lr, total_steps=steps + 1)  # it is stepped once after the last step
         raise ConfigError(f"schedule is constant, cosine, step, drop or one_cycle, got {self.schedule!r}")
+
+
+def random_rotation() -> Tensor:
+    """Return a rotation matrix, shape (3, 3), drawn uniformly by PyTorch's generator."""
+    quaternion = torch.randn(4, dtype=torch.float64)  # its direction is uniform on the sphere
+    return torch.as_tensor(Rotation.from_quat(quaternion.numpy()).as_matrix())

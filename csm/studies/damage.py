@@ -31,6 +31,7 @@ from csm.studies.kept import kept
 from csm.studies.study import Context
 
 Damage = Callable[[Mesh], Damaged]
+Describe = Callable[[Mesh], torch.Tensor]
 TESTED = 20
 """The last so many bodies, which no network was trained on."""
 
@@ -72,6 +73,7 @@ def damage_rows(
     for name in progress_bar(targets, desc="match", unit="target"):
         target = bodies.original.load(name)
         sources = [bodies.original.load(source) for source, other in pairs if other == name]
+        whole = {method: functools.cache(contestant.describe) for method, contestant in methods.items()}
         for title, damage in damages.items():
             once = functools.cache(damage)  # the same for every method, and not made where all is kept
             for method, contestant in methods.items():
@@ -85,7 +87,7 @@ def damage_rows(
                     kept(
                         context.out / "damage" / _file(question),
                         question,
-                        lambda: _measure(target, sources, once, contestant, plan, context.seed),  # noqa: B023
+                        lambda: _measure(target, sources, once, contestant.describe, whole[method], plan, context.seed),  # noqa: B023
                     )
                 )
     return [{"damage": title, "method": method, **_summary(cells)} for (title, method), cells in found.items()]
@@ -102,26 +104,27 @@ def _file(question: Mapping[str, Any]) -> str:
 
 
 def _measure(
-    target: Shape, sources: Sequence[Shape], damage: Damage, contestant: Contestant, plan: Plan, seed: int
+    target: Shape, sources: Sequence[Shape], damage: Damage, describe: Describe, whole: Describe, plan: Plan, seed: int
 ) -> dict[str, Any]:
+    """Measure one method on one damaged target; `whole` describes what is not damaged, and remembers it."""
     try:
         damaged = damage(target.mesh)
-        there = contestant.describe(damaged.mesh)
+        there = describe(damaged.mesh)
     except MeshError as error:
         return {"failed": str(error)}
-    matched = [_matched(source, target, damaged, there, contestant, plan.points, seed) for source in sources]
+    matched = [_matched(source, target, damaged, there, whole, plan.points, seed) for source in sources]
     measured = target_errors(target.mesh, plan.distance, "diameter", matched)
     errors = np.concatenate([e.distance for e in measured.errors]) / measured.lengths.diameter
     return {"errors": errors.round(6).tolist(), "left": len(damaged.kept) / target.mesh.n_vertices}
 
 
 def _matched(
-    source: Shape, target: Shape, damaged: Damaged, there: torch.Tensor, contestant: Contestant, points: int, seed: int
+    source: Shape, target: Shape, damaged: Damaged, there: torch.Tensor, whole: Describe, points: int, seed: int
 ) -> MatchedPoints:
     truth = ground_truth(source.truth, target.truth)
     left: IntArray = np.flatnonzero(np.isin(truth.target, damaged.kept))
     chosen = left[np.random.default_rng(seed).permutation(len(left))[:points]]
-    here = contestant.describe(source.mesh)
+    here = whole(source.mesh)
     found = damaged.kept[nearest(here[torch.as_tensor(truth.source[chosen])], there)]
     return MatchedPoints(truth.target[chosen], found)
 

@@ -192,6 +192,14 @@ def test_a_row_that_was_trained_otherwise_is_not_taken_for_another(bench, capsys
         fill("model.dropout=0.25")
     assert "model.dropout: 0 there, 0.25 wanted" in capsys.readouterr().err
     assert (bench.folder / "shared/one/seed0/model.ckpt").read_bytes() == before
+    file = bench.folder / "shared/one/seed0/row.json"
+    kept = json.loads(file.read_text())
+    file.write_text(json.dumps({key: value for key, value in kept.items() if key != "optimizer.rotate"}))
+    fill()  # an option of a later version that is off
+    file.write_text(json.dumps({key: value for key, value in kept.items() if key != "optimizer.lr"}))
+    with pytest.raises(SystemExit):
+        fill()
+    assert "optimizer.lr: None there" in capsys.readouterr().err
 
 
 def test_a_table_of_learned_methods_is_reproduced_from_its_matrix(bench):

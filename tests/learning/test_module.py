@@ -5,11 +5,12 @@ import torch
 import torch.nn.functional as F
 from lightning import Trainer
 
+from csm.descriptors import Coordinates
 from csm.errors import ConfigError, DataError
 from csm.evaluation.matching import nearest
 from csm.learning.callbacks import EpochLines, ValidationErrors
 from csm.learning.export import load_module
-from csm.learning.module import CSMModule
+from csm.learning.module import CSMModule, random_rotation
 from tests.toyset import toy_datamodule
 
 NETWORK = {"name": "csmcnn", "channels": [16, 16, 16], "descriptor_channels": 24, "ks": 20, "terms": 4, "dropout": 0.0}
@@ -99,6 +100,36 @@ def test_the_loss_of_drawn_rows_is_that_of_all_rows_on_average(datamodule):
         draws = torch.stack([module.loss(x, sample) for _ in range(400)])
     assert draws.std() > 0
     assert abs(draws.mean() - full.loss(x, sample)) < 5 * draws.std() / 20
+
+
+def test_rotations_are_proper_and_point_everywhere():
+    torch.manual_seed(0)
+    drawn = torch.stack([random_rotation() for _ in range(2000)])
+    torch.testing.assert_close(drawn @ drawn.mT, torch.eye(3).double().expand(2000, 3, 3))
+    assert torch.linalg.det(drawn).min() > 0.99
+    assert drawn.mean(0).abs().max() < 0.06  # the standard error of an entry is 0.013
+    torch.testing.assert_close(drawn.square().mean(0), torch.full((3, 3), 1 / 3).double(), atol=0.03, rtol=0)
+
+
+def test_positions_are_turned_in_training_only(tmp_path):
+    datamodule = toy_datamodule(tmp_path, descriptor=Coordinates())
+    datamodule.prepare_data()
+    module, sample = make(datamodule, rotate=True), next(iter(datamodule.val_dataloader()))
+    seen: list[torch.Tensor] = []
+    describe = module.network.describe
+    module.network.describe = lambda x, surface: (seen.append(x), describe(x, surface))[1]
+    module.log = lambda *_, **__: None
+    module.training_step(sample)
+    module.validation_step(sample)
+    turned, plain = seen
+    assert torch.equal(plain, sample.features)
+    assert (turned - plain).abs().max() > 0.1
+    torch.testing.assert_close(turned @ turned.T, plain @ plain.T, atol=1e-5, rtol=0)
+
+
+def test_what_does_not_turn_with_the_shape_is_not_turned(datamodule):
+    with pytest.raises(ConfigError, match="descriptor=xyz"):
+        make(datamodule, rotate=True)
 
 
 def test_a_checkpoint_is_plain_data_and_loads_without_a_config(trained, datamodule):
