@@ -86,13 +86,17 @@ class ScapeDataModule(CorrespondenceDataModule):
     ----------
     root
         Folder with SCAPE_5000.
+    test_roots
+        Folders of the same bodies in other triangulations, such as the 12,500 vertices that the paper tests on and that
+        nobody publishes: files called as in SCAPE_5000 (mesh052.off), and within a folder one connectivity.  They are
+        tested on besides SCAPE_5000.
     options
         Of `CorrespondenceDataModule`.
     """
 
-    def __init__(self, root: str | Path, **options: Any) -> None:
+    def __init__(self, root: str | Path, test_roots: Sequence[str | Path] | None = None, **options: Any) -> None:
         scape = find_set(root, "SCAPE_5000")
-        super().__init__(scape, [scape], **options)
+        super().__init__(scape, [scape, *map(recognise, test_roots or ())], **options)
 
 
 class ToscaDataModule(CorrespondenceDataModule):

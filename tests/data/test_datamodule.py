@@ -8,11 +8,13 @@ from csm.data.datamodule import to_sample
 from csm.data.datasets import FaustDataModule, ScapeDataModule, Shrec19DataModule, ToscaDataModule
 from csm.data.prepare import Prepared, Recipe, prepare_shape
 from csm.data.shapeset import Shape
-from csm.data.splits import Split
+from csm.data.splits import Split, read_split
 from csm.data.store import Store
 from csm.descriptors import ACD
 from csm.errors import DataError
 from csm.mesh.correspondence import Direction, PointMap
+from csm.mesh.io import write_mesh
+from csm.mesh.shape import Mesh
 from tests.conftest import ROOT
 from tests.shapes import blob
 from tests.toyset import toy_datamodule, write_toys
@@ -101,6 +103,20 @@ def test_scape_classes_reach_vertices_through_labels(data_set, tmp_path):
     assert len(sample.classes) == 5000
     assert len(torch.unique(sample.rows)) < 5000
     assert sample.rows.max() < len(sample.features)
+
+
+@pytest.mark.data
+def test_scape_is_tested_in_other_triangulations_that_the_user_has(data_set, tmp_path):
+    split = ROOT / "conf/split/scape_51_20.json"
+    for k, name in enumerate(read_split(split).test):
+        write_mesh(tmp_path / f"SCAPE_12500/{name}.off", Mesh((1 + k) * blob(2).vertices, blob(2).faces))
+    datamodule = ScapeDataModule(
+        data_set("SCAPE_5000"), test_roots=[tmp_path / "SCAPE_12500"], split=split, store=Store(tmp_path / "s"), **CHEAP
+    )
+    assert list(datamodule.test_sets) == ["SCAPE_5000", "SCAPE_12500"]
+    fine = datamodule.test_sets["SCAPE_12500"]
+    assert datamodule.test_names(fine) == datamodule.split.test
+    assert (datamodule.load(fine, "mesh052").shape.truth.indices == np.arange(162)).all()
 
 
 @pytest.mark.data
