@@ -11,10 +11,10 @@ from typing import Any
 
 from omegaconf import DictConfig, OmegaConf
 
+from csm._processes import processes
 from csm.commands.app import command
 from csm.commands.learned import LEARNED
 from csm.commands.learned import make as make_learned
-from csm.data.prepare import processes
 from csm.data.store import Store
 from csm.errors import ConfigError
 from csm.evaluation.provenance import provenance

@@ -9,10 +9,11 @@ from typing import Any, Literal, TypeAlias, get_args
 from omegaconf import DictConfig, OmegaConf
 from torch import Tensor
 
+from csm._processes import processes
 from csm._progress import progress_bar
 from csm._types import IntArray
 from csm.data.datamodule import CorrespondenceDataModule
-from csm.data.prepare import Job, processes
+from csm.data.prepare import Job
 from csm.data.shapeset import Shape, ShapeSet
 from csm.errors import ConfigError
 from csm.evaluation.matching import Votes, nearest

@@ -88,7 +88,7 @@ class CorrespondenceDataModule(L.LightningDataModule):
     store
         Where features and bases are kept.
     workers
-        Processes for the preparation and for the distances of tests, see `csm.data.prepare.processes`.
+        Processes for the preparation and for the distances of tests, see `csm._processes.processes`.
     stencils
         What else the network wants to know of a shape, see `csm.operators.stencils`.
     """

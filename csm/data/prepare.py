@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import logging
-import multiprocessing
-import os
 import time
-from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
-from csm._progress import progress_bar
+from csm._processes import processes, run_all
 from csm._types import Arrays, Float32Array
 from csm.data.shapeset import Shape, ShapeSet
 from csm.data.store import Store
@@ -127,27 +124,15 @@ def _prepare_one(job: Job, recipe: Recipe, root: str) -> tuple[str, str]:
     """Prepare one shape in a worker; return what happened ("present", "made" or "failed") and why."""
     store = Store(root)
     try:
-        with threadpool_limits(1):
-            shape = job.shapes.load(job.name)
-            if not is_prepared(shape.mesh, recipe, store):
-                prepare_shape(shape, recipe, store)
+        shape = job.shapes.load(job.name)
+        if not is_prepared(shape.mesh, recipe, store):
+            prepare_shape(shape, recipe, store)
     except CsmError as error:
         return "failed", str(error)
     except Exception as error:  # one bad shape must not end the run; the table at the end names it
         _log.exception("%s", job.label)
         return "failed", f"{type(error).__name__}: {error}"
     return ("made" if store.computed else "present"), ""
-
-
-def processes(workers: int | None, n_jobs: int) -> int:
-    """Return how many processes to start: as many as asked for; by default one per core, none for fewer than 3 jobs.
-
-    Examples
-    --------
-    >>> processes(None, 2), processes(4, 2)
-    (0, 4)
-    """
-    return workers if workers is not None else (os.cpu_count() or 1) if n_jobs > 2 else 0
 
 
 def prepare(
@@ -166,7 +151,7 @@ def prepare(
     store
         Where it goes.
     workers
-        Processes, each with one BLAS thread; see `processes`.
+        Processes, each with one BLAS thread; see `csm._processes.processes`.
     progress
         Show a progress bar with the shape's name and the estimated time left.
 
@@ -175,30 +160,10 @@ def prepare(
     Summary
         Failures are listed there, not raised.
     """
-    summary, begun = Summary(), time.perf_counter()
-    with progress_bar(total=len(jobs), desc="prepare", unit="shape", disable=not progress) as bar:
-        for job, (state, why) in _run(jobs, recipe, store, processes(workers, len(jobs))):
-            if state == "failed":
-                summary.failures.append((job.label, why))
-            elif state == "made":
-                summary.made += 1
-            else:
-                summary.present += 1
-            bar.set_postfix_str(job.label, refresh=False)
-            bar.update()
-    summary.seconds = time.perf_counter() - begun
-    return summary
-
-
-def _run(jobs: Sequence[Job], recipe: Recipe, store: Store, workers: int) -> Iterable[tuple[Job, tuple[str, str]]]:
-    root = str(store.root)
-    if workers < 1:
-        yield from ((job, _prepare_one(job, recipe, root)) for job in jobs)
-        return
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        running: dict[Future[tuple[str, str]], Job] = {
-            pool.submit(_prepare_one, job, recipe, root): job for job in jobs
-        }
-        while running:
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                yield running.pop(future), future.result()
+    begun = time.perf_counter()
+    one = partial(_prepare_one, recipe=recipe, root=str(store.root))
+    count = processes(workers, len(jobs))
+    done = run_all(one, jobs, lambda job: job.label, count, what="prepare", unit="shape", progress=progress)
+    states = [state for state, _ in done]
+    failures = [(job.label, why) for job, (state, why) in zip(jobs, done, strict=True) if state == "failed"]
+    return Summary(states.count("present"), states.count("made"), failures, time.perf_counter() - begun)

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from csm._processes import run_all
 from csm._types import FloatArray
 from csm.data.datasets import find_set
 from csm.data.humansset import HumansSet
@@ -24,7 +25,6 @@ from csm.mesh.correspondence import ground_truth
 from csm.mesh.io import atomic_path
 from csm.operators.bundle import Operators
 from csm.operators.geodesic import Method
-from csm.studies.pool import run_all
 from csm.studies.study import Context
 
 PERSONS, POSES = 8, 10

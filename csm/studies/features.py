@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from csm._processes import run_all
 from csm._types import Float32Array
 from csm.data.prepare import compute_features
 from csm.data.shapeset import ShapeSet
@@ -13,7 +14,6 @@ from csm.descriptors.base import Descriptor, eigenpairs
 from csm.errors import CsmError
 from csm.mesh.shape import Mesh
 from csm.operators.bundle import Operators
-from csm.studies.pool import run_all
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from csm._processes import run_all
 from csm._types import Arrays
 from csm.data.prepare import compute_features
 from csm.data.shapeset import Shape, ShapeSet
@@ -20,7 +21,6 @@ from csm.evaluation.matching import nearest
 from csm.evaluation.protocol import Pair, Protocol, matched_points, thinned
 from csm.evaluation.results import PairErrors
 from csm.studies.measure import Measured, Question, chosen_points, errors_on_target
-from csm.studies.pool import run_all
 
 
 @dataclass(frozen=True, eq=False)

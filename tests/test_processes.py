@@ -5,7 +5,7 @@ import os
 import pytest
 from threadpoolctl import threadpool_info
 
-from csm.studies.pool import run_all
+from csm._processes import run_all
 
 
 def square(x: int) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from typing import TypeVar
@@ -15,8 +16,26 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 
+def processes(workers: int | None, n_jobs: int) -> int:
+    """Return how many processes to start: as many as asked for; by default one per core, none for fewer than 3 jobs.
+
+    Examples
+    --------
+    >>> processes(None, 2), processes(4, 2)
+    (0, 4)
+    """
+    return workers if workers is not None else (os.cpu_count() or 1) if n_jobs > 2 else 0
+
+
 def run_all(
-    function: Callable[[T], R], tasks: Sequence[T], label: Callable[[T], str], workers: int, *, what: str, unit: str
+    function: Callable[[T], R],
+    tasks: Sequence[T],
+    label: Callable[[T], str],
+    workers: int,
+    *,
+    what: str,
+    unit: str,
+    progress: bool = True,
 ) -> list[R]:
     """Return what `function` gives for every task, in their order.
 
@@ -32,9 +51,11 @@ def run_all(
         Processes; up to 1 works in this process.
     what, unit
         Of the bar.
+    progress
+        Show the bar, with the name of the task done last and the estimated time left.
     """
     results: dict[int, R] = {}
-    with progress_bar(total=len(tasks), desc=what, unit=unit) as bar:
+    with progress_bar(total=len(tasks), desc=what, unit=unit, disable=not progress) as bar:
         for at, result in _run(function, tasks, workers):
             results[at] = result
             bar.set_postfix_str(label(tasks[at]), refresh=False)
