@@ -27,11 +27,12 @@ from csm.mesh.shape import Mesh
 from csm.operators.geodesic import Method as Distance
 from csm.studies.bodies import Bodies
 from csm.studies.contestants import Contestant
-from csm.studies.kept import kept
+from csm.studies.kept import keep, recall
 from csm.studies.study import Context
 
 Damage = Callable[[Mesh], Damaged]
 Describe = Callable[[Mesh], torch.Tensor]
+Key = tuple[str, str]
 TESTED = 20
 """The last so many bodies, which no network was trained on."""
 
@@ -69,28 +70,36 @@ def damage_rows(
     """
     pairs = _draw_pairs(bodies.original.names[-TESTED:], plan.n_pairs, context.seed)
     targets = list(dict.fromkeys(target for _, target in pairs))
-    found: dict[tuple[str, str], list[dict[str, Any]]] = {(d, m): [] for d in damages for m in methods}
+    found: dict[Key, list[dict[str, Any]]] = {(d, m): [] for d in damages for m in methods}
     for name in progress_bar(targets, desc="match", unit="target"):
-        target = bodies.original.load(name)
         sources = [bodies.original.load(source) for source, other in pairs if other == name]
-        whole = {method: functools.cache(contestant.describe) for method, contestant in methods.items()}
-        for title, damage in damages.items():
-            once = functools.cache(damage)  # the same for every method, and not made where all is kept
-            for method, contestant in methods.items():
-                question = {
-                    "damage": title,
-                    "method": contestant.key,
-                    "meshes": [shape.mesh.digest for shape in (target, *sources)],
-                    "plan": [plan.points, plan.distance, context.seed],
-                }
-                found[title, method].append(
-                    kept(
-                        context.out / "damage" / _file(question),
-                        question,
-                        lambda: _measure(target, sources, once, contestant.describe, whole[method], plan, context.seed),  # noqa: B023
-                    )
-                )
+        cells = _cells(context, bodies.original.load(name), sources, damages, methods, plan)
+        for key, cell in cells.items():
+            found[key].append(cell)
     return [{"damage": title, "method": method, **_summary(cells)} for (title, method), cells in found.items()]
+
+
+def _cells(
+    context: Context,
+    target: Shape,
+    sources: Sequence[Shape],
+    damages: Mapping[str, Damage],
+    methods: Mapping[str, Contestant],
+    plan: Plan,
+) -> dict[Key, dict[str, Any]]:
+    """Return what was measured on one target, from files where it is there; what is not is measured together."""
+    meshes = [shape.mesh.digest for shape in (target, *sources)]
+    settings = [plan.points, plan.distance, context.seed]
+    questions: dict[Key, dict[str, Any]] = {
+        (title, method): {"damage": title, "method": contestant.key, "meshes": meshes, "plan": settings}
+        for title in damages
+        for method, contestant in methods.items()
+    }
+    files = {key: context.out / "damage" / _file(question) for key, question in questions.items()}
+    cells = {key: recall(files[key], question) for key, question in questions.items()}
+    missing = [key for key, cell in cells.items() if cell is None]
+    made = _measure(target, sources, missing, damages, methods, plan, context.seed) if missing else {}
+    return {key: keep(files[key], questions[key], made[key]) if cell is None else cell for key, cell in cells.items()}
 
 
 def _draw_pairs(names: Sequence[str], n: int, seed: int) -> list[tuple[str, str]]:
@@ -104,18 +113,38 @@ def _file(question: Mapping[str, Any]) -> str:
 
 
 def _measure(
-    target: Shape, sources: Sequence[Shape], damage: Damage, describe: Describe, whole: Describe, plan: Plan, seed: int
-) -> dict[str, Any]:
-    """Measure one method on one damaged target; `whole` describes what is not damaged, and remembers it."""
-    try:
-        damaged = damage(target.mesh)
-        there = describe(damaged.mesh)
-    except MeshError as error:
-        return {"failed": str(error)}
-    matched = [_matched(source, target, damaged, there, whole, plan.points, seed) for source in sources]
-    measured = target_errors(target.mesh, plan.distance, "diameter", matched)
-    errors = np.concatenate([e.distance for e in measured.errors]) / measured.lengths.diameter
-    return {"errors": errors.round(6).tolist(), "left": len(damaged.kept) / target.mesh.n_vertices}
+    target: Shape,
+    sources: Sequence[Shape],
+    keys: Sequence[Key],
+    damages: Mapping[str, Damage],
+    methods: Mapping[str, Contestant],
+    plan: Plan,
+    seed: int,
+) -> dict[Key, dict[str, Any]]:
+    """Match by these damages and methods, then measure all together: most points are the same, and their distances."""
+    made: dict[Key, dict[str, Any]] = {}
+    matched: dict[Key, list[MatchedPoints]] = {}
+    whole = {method: functools.cache(contestant.describe) for method, contestant in methods.items()}
+    once = {title: functools.cache(damage) for title, damage in damages.items()}
+    for title, method in keys:
+        try:
+            damaged = once[title](target.mesh)
+            there = methods[method].describe(damaged.mesh)
+        except MeshError as error:
+            made[title, method] = {"failed": str(error)}
+            continue
+        matched[title, method] = [
+            _matched(source, target, damaged, there, whole[method], plan.points, seed) for source in sources
+        ]
+        made[title, method] = {"left": len(damaged.kept) / target.mesh.n_vertices}
+    if not matched:
+        return made
+    measured = target_errors(target.mesh, plan.distance, "diameter", [p for points in matched.values() for p in points])
+    errors = iter(measured.errors)
+    for key in matched:
+        distances = np.concatenate([next(errors).distance for _ in sources]) / measured.lengths.diameter
+        made[key]["errors"] = distances.round(6).tolist()
+    return made
 
 
 def _matched(

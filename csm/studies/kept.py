@@ -30,16 +30,27 @@ def kept(path: Path, question: Mapping[str, Any], make: Callable[[], Mapping[str
     dict
         The answer as json gives it back, so that it is the same whether it was made or read.
     """
-    asked = json.loads(json.dumps(dict(question)))
-    if path.exists():
-        content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        if content.pop("question", None) == asked:
-            return content
-        _log.warning("%s answers another question (its parameters are in the file); it is made again", path)
-    text = json.dumps({"question": asked, **make()}, indent=1)
+    answer = recall(path, question)
+    return keep(path, question, make()) if answer is None else answer
+
+
+def recall(path: Path, question: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Return the answer that a file holds if there is one to this question."""
+    if not path.exists():
+        return None
+    content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    if content.pop("question", None) == json.loads(json.dumps(dict(question))):
+        return content
+    _log.warning("%s answers another question (its parameters are in the file); it is made again", path)
+    return None
+
+
+def keep(path: Path, question: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, Any]:
+    """Write an answer with its question, under a temporary name first, and return it as `recall` will."""
+    text = json.dumps({"question": dict(question), **answer}, indent=1)
     with atomic_path(path) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
-    content = json.loads(text)
+    content: dict[str, Any] = json.loads(text)
     del content["question"]
     return content
 

@@ -25,6 +25,12 @@ def test_what_was_measured_is_kept_for_its_question_only(tmp_path, monkeypatch):
 
     monkeypatch.setattr(damage, "_measure", never)
     assert damage_rows(context, bodies, damages, methods, PLAN) == first
+    monkeypatch.undo()
+    more = damages | {"noise": partial(with_noise, strength=0.5)}
+    assert damage_rows(context, bodies, more, methods, PLAN)[0] == first[0]
+    alone = damage_rows(toy_context(tmp_path / "alone"), bodies, more, methods, PLAN)
+    assert damage_rows(context, bodies, more, methods, PLAN) == alone
+    monkeypatch.setattr(damage, "_measure", never)
     with pytest.raises(AssertionError):
         damage_rows(context, bodies, damages, methods, Plan(n_pairs=2, points=31, distance="edge"))
 
