@@ -19,8 +19,8 @@ from csm.evaluation.tables import error_cell
 from csm.studies.contenders import row_title
 from csm.studies.published import LEARNED_AGE
 from csm.studies.study import Context, Findings
-from csm.viewer.comparisons import dots_figure
-from csm.viewer.figures import Curve, cqc_figure, save_figure
+from csm.viewer.comparisons import curve_panels, dots_figure
+from csm.viewer.figures import Curve, save_figure
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class LearnedStudy:
     cells
         Folder of the trained networks, below that of the artefacts; studies that name the same one share rows.
     picture
-        Curves, one picture per test set, or all mean errors as dots in one.
+        Curves, with a panel per test set, or all mean errors as dots.
     """
 
     purpose: str
@@ -76,11 +76,9 @@ def make(cfg: DictConfig, context: Context, name: str) -> Findings:
     matrix.run(compose("matrix", overrides=[*fixed, *cfg[name].overrides]))
     rows = read_rows(folder / f"{study.experiment}.json")
     draw = dots if study.picture == "dots" else curves
-    pictures = []
-    for suffix, figure in draw(folder, [row for row in rows if "," not in row.method]).items():
-        pictures.append(context.out / f"{name}{suffix}.png")
-        save_figure(pictures[-1], figure)
-    return findings(name, rows, pictures)
+    picture = context.out / f"{name}.png"
+    save_figure(picture, draw(folder, [row for row in rows if "," not in row.method]))
+    return findings(name, rows, [picture])
 
 
 def findings(name: str, rows: Sequence[ResultRow], pictures: Sequence[Path] = ()) -> Findings:
@@ -102,22 +100,21 @@ def findings(name: str, rows: Sequence[ResultRow], pictures: Sequence[Path] = ()
     return Findings(name, title, columns, list(lines.values()), tuple(notes), tuple(pictures))
 
 
-def dots(folder: Path, rows: Sequence[ResultRow]) -> dict[str, Figure]:
-    """Return one picture of the mean errors, a kind of dot per test set."""
+def dots(_: Path, rows: Sequence[ResultRow]) -> Figure:
+    """Return a picture of the mean errors, with a kind of dot per test set."""
     ages = {(row.method, row.test): 1000 * row.age for row in rows}
     methods, tests = (list(dict.fromkeys(key[i] for key in ages)) for i in (0, 1))
     values = {test: [ages.get((method, test), float("nan")) for method in methods] for test in tests}
     names = [row_title(method) for method in methods]
-    return {"": dots_figure(names, {"mean error (thousandths of the diameter)": values})}
+    return dots_figure(names, {"mean error (thousandths of the diameter)": values})
 
 
-def curves(folder: Path, rows: Sequence[ResultRow]) -> dict[str, Figure]:
-    """Return one picture of curves per test set."""
-    tests = dict.fromkeys(row.test for row in rows)
-    return {
-        f"_{test}": cqc_figure({row_title(row.method): _curve(folder, row) for row in rows if row.test == test})
-        for test in tests
-    }
+def curves(folder: Path, rows: Sequence[ResultRow]) -> Figure:
+    """Return a picture of the shares of points within an error, with a panel per test set."""
+    panels: dict[str, dict[str, Curve]] = {row.test: {} for row in rows}
+    for row in rows:
+        panels[row.test][row_title(row.method)] = _curve(folder, row)
+    return curve_panels(panels)
 
 
 def _curve(folder: Path, row: ResultRow) -> Curve:

@@ -1,4 +1,4 @@
-"""Figures that compare methods or settings by numbers: dots in rows, and curves over parameters."""
+"""Figures that compare methods or settings by numbers: dots in rows, curves over errors and over parameters."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from csm._types import FloatArray
 from csm.errors import ConfigError
-from csm.viewer.style import CYCLE, plain_axes
+from csm.viewer.figures import Curve
+from csm.viewer.style import CYCLE, line_style, plain_axes
 
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
@@ -53,6 +55,44 @@ def dots_figure(names: Sequence[str], panels: Mapping[str, Mapping[str, Sequence
     handles, labels = grid[0].get_legend_handles_labels()
     if len(labels) > 1:
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False, fontsize=8)
+    return figure
+
+
+def curve_panels(panels: Mapping[str, Mapping[str, Curve]]) -> Figure:
+    """Plot shares of matches within an error, a panel per set; the legend goes by the mean errors of the first set.
+
+    Parameters
+    ----------
+    panels
+        Title of the set -> name of the method -> its curve, over errors as fractions of the diameter.
+
+    Raises
+    ------
+    ConfigError
+        If there is no curve.
+    """
+    names = list(dict.fromkeys(name for curves in panels.values() for name in curves))
+    if not names:
+        raise ConfigError(f"curves of {len(panels)} sets: there is nothing to draw")
+    figure = Figure(figsize=(4.2 * len(panels) + 1.6, 4.0), layout="constrained")
+    FigureCanvasAgg(figure)
+    row = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    styles = {name: line_style(k) for k, name in enumerate(names)}
+    lines: dict[str, Line2D] = {}
+    ages: dict[str, float] = {}
+    for axes, (title, curves) in zip(row, panels.items(), strict=True):
+        plain_axes(axes)
+        for name, curve in curves.items():
+            (line,) = axes.plot(curve.thresholds, 100 * curve.cqc, label=name, **styles[name])
+            lines.setdefault(name, line)
+            ages.setdefault(name, curve.age)
+        axes.set_xlim(0, max((float(curve.thresholds[-1]) for curve in curves.values()), default=1.0))
+        axes.set_ylim(0, 100)
+        axes.set_title(title)
+        axes.set_xlabel("geodesic error (fraction of the diameter)")
+    row[0].set_ylabel("matches within the error (%)")
+    order = sorted(lines, key=ages.__getitem__)
+    figure.legend([lines[name] for name in order], order, loc="outside right center", frameon=False)
     return figure
 
 

@@ -5,7 +5,7 @@ import pytest
 from PIL import Image
 
 from csm.data.store import Store
-from csm.studies.figure4 import WITHIN, curves_figure, run
+from csm.studies.figure4 import WITHIN, run
 from csm.studies.study import Context
 from csm.studies.table1 import run as run_table1
 from tests.remeshedset import write_faust, write_tosca
@@ -36,14 +36,3 @@ def test_curves_are_those_of_table_1_and_drawn_in_one_picture(context, monkeypat
             assert row[f"% within {limit:g}"] == pytest.approx(100 * curve[limit])
     (path,) = findings.pictures
     assert Image.open(path).width > Image.open(path).height
-
-
-def test_a_panel_per_set_and_a_line_per_descriptor(context):
-    from csm.studies.table1 import measure_sets
-
-    columns = measure_sets(context, **OPTIONS, points=None, sample=None)
-    figure = curves_figure({key: column.cells for key, column in columns.items()})
-    assert [axes.get_title() for axes in figure.axes] == ["faust", "tosca"]
-    for axes in figure.axes:
-        assert len(axes.get_lines()) == 2
-        assert len({(line.get_color(), line.get_linestyle()) for line in axes.get_lines()}) == 2

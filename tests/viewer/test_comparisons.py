@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from csm.errors import ConfigError
-from csm.viewer.comparisons import Sweep, dots_figure, sweeps_figure
+from csm.viewer.comparisons import Sweep, curve_panels, dots_figure, sweeps_figure
+from csm.viewer.figures import Curve
 
 
 def test_dots_stand_in_the_row_of_their_name_from_top_to_bottom():
@@ -30,6 +31,27 @@ def test_a_single_condition_needs_no_legend():
 def test_dots_need_one_value_per_row():
     with pytest.raises(ConfigError, match=r"\['fine'\] to draw; wanted 2 values"):
         dots_figure(["a", "b"], {"error": {"fine": [1]}})
+
+
+def curve(age: float) -> Curve:
+    return Curve(np.array([0.0, 0.1, 0.2]), np.array([0.1, 0.5, 1.0]), age)
+
+
+def test_curves_have_a_panel_per_set_and_one_style_per_method():
+    figure = curve_panels({"fine": {"a": curve(0.2), "b": curve(0.1)}, "coarse": {"b": curve(0.3), "c": curve(0.15)}})
+    fine, coarse = figure.axes
+    assert (fine.get_title(), coarse.get_title()) == ("fine", "coarse")
+    np.testing.assert_array_equal(fine.get_lines()[0].get_ydata(), [10, 50, 100])
+    look = {str(line.get_label()): (line.get_color(), line.get_linestyle()) for line in fine.get_lines()}
+    look |= {str(line.get_label()): (line.get_color(), line.get_linestyle()) for line in coarse.get_lines()}
+    assert len(set(look.values())) == 3
+    assert look["b"] == (fine.get_lines()[1].get_color(), fine.get_lines()[1].get_linestyle())
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["b", "c", "a"]
+
+
+def test_curves_need_something_to_draw():
+    with pytest.raises(ConfigError, match="nothing to draw"):
+        curve_panels({"fine": {}})
 
 
 def test_a_sweep_is_drawn_over_its_values_with_the_preset_marked():
