@@ -10,28 +10,12 @@ import json
 import re
 from pathlib import Path
 
-from csm.evaluation.report import ResultRow, read_rows
-from csm.evaluation.tables import Published, markdown_table, paper_table
-from csm.studies.published import LEARNED_AGE
+from csm.evaluation.report import read_rows
+from csm.studies.learned import findings
 from csm.studies.study import Findings
 
 ROOT = Path(__file__).resolve().parent.parent
 BLOCK = re.compile(r"(<!-- (table|study): (\S+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
-
-PUBLISHED: Published = {(m, test): age / 1000 for m, ages in LEARNED_AGE.items() for test, age in ages.items()}
-"""Tables 4 and 5 of the paper, as fractions of the diameter."""
-
-
-def tables(rows: list[ResultRow]) -> str:
-    """Return the paper's errors beside ours, then our rows with their protocol."""
-    protocols: dict[str, list[ResultRow]] = {}
-    for row in rows:
-        protocols.setdefault(row.protocol, []).append(row)
-    lines = []
-    for protocol, measured in protocols.items():
-        tests, methods = (", ".join(dict.fromkeys(getattr(row, key) for row in measured)) for key in ("test", "method"))
-        lines.append(f"{tests}{f' ({methods})' if len(protocols) > 1 else ''}: {protocol}")
-    return f"{paper_table(rows, PUBLISHED)}\n{markdown_table(rows)}\n" + "\n\n".join(lines) + "\n"
 
 
 def study(path: Path) -> str:
@@ -47,7 +31,7 @@ def with_tables(text: str) -> str:
 
 
 def _content(kind: str, path: Path) -> str:
-    return study(path) if kind == "study" else tables(read_rows(path))
+    return study(path) if kind == "study" else f"{findings(path.stem, read_rows(path)).markdown()}\n"
 
 
 if __name__ == "__main__":

@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
-import numpy as np
 from hydra import compose
-from matplotlib.figure import Figure
 from omegaconf import DictConfig
 
 from csm.commands import matrix
-from csm.evaluation.report import ResultRow, read_rows
-from csm.evaluation.tables import error_cell
-from csm.studies.contenders import row_title
-from csm.studies.published import LEARNED_AGE
+from csm.evaluation.report import read_rows
+from csm.studies.learned import curves, dots, findings
 from csm.studies.study import Context, Findings
-from csm.viewer.comparisons import curve_panels, dots_figure
-from csm.viewer.figures import Curve, save_figure
+from csm.viewer.figures import save_figure
 
 
 @dataclass(frozen=True)
@@ -79,54 +72,3 @@ def make(cfg: DictConfig, context: Context, name: str) -> Findings:
     picture = context.out / f"{name}.png"
     save_figure(picture, draw(folder, [row for row in rows if "," not in row.method]))
     return findings(name, rows, [picture])
-
-
-def findings(name: str, rows: Sequence[ResultRow], pictures: Sequence[Path] = ()) -> Findings:
-    """Return the rows of a filled matrix as findings, the paper's error beside ours where it has one."""
-    lines: dict[str, dict[str, Any]] = {}
-    for row in rows:
-        known = {"method": row_title(row.method), "row": row.method, "seeds": _text(row.seeds), "epochs": row.epochs}
-        line = lines.setdefault(row.method, known)
-        line[f"{row.test} paper"] = LEARNED_AGE.get(row.method, {}).get(row.test)
-        line[row.test] = error_cell(row)
-        line[f"{row.test} exact %"] = 100 * row.exact_match
-        line.setdefault("rows", []).append({key: getattr(row, key) for key in ("age", "age_std", "p95", "auc", "test")})
-    tests = list(dict.fromkeys(row.test for row in rows))
-    shown = [column for test in tests for column in (f"{test} paper", test, f"{test} exact %")]
-    title = f"Mean geodesic error of learned methods in thousandths of the diameter, trained on {rows[0].train}."
-    notes = [f"{row.test}: {row.protocol}" for row in {row.test: row for row in rows}.values()]
-    notes.append("Rows with argmax are matched through the classifier, the others by the nearest learned descriptor.")
-    columns = ("method", *shown, "seeds", "epochs")
-    return Findings(name, title, columns, list(lines.values()), tuple(notes), tuple(pictures))
-
-
-def dots(_: Path, rows: Sequence[ResultRow]) -> Figure:
-    """Return a picture of the mean errors, with a kind of dot per test set."""
-    ages = {(row.method, row.test): 1000 * row.age for row in rows}
-    methods, tests = (list(dict.fromkeys(key[i] for key in ages)) for i in (0, 1))
-    values = {test: [ages.get((method, test), float("nan")) for method in methods] for test in tests}
-    names = [row_title(method) for method in methods]
-    return dots_figure(names, {"mean error (thousandths of the diameter)": values})
-
-
-def curves(folder: Path, rows: Sequence[ResultRow]) -> Figure:
-    """Return a picture of the shares of points within an error, with a panel per test set."""
-    panels: dict[str, dict[str, Curve]] = {row.test: {} for row in rows}
-    for row in rows:
-        panels[row.test][row_title(row.method)] = _curve(folder, row)
-    return curve_panels(panels)
-
-
-def _curve(folder: Path, row: ResultRow) -> Curve:
-    """Average the curves of a row's seeds, which the matrix keeps beside its cells."""
-    file = f"{row.test}_{row.distance}_{row.normaliser}.cqc.csv"
-    tables = []
-    for seed in row.seeds:
-        with (folder / row.method / f"seed{seed}" / file).open(newline="", encoding="utf-8") as opened:
-            tables.append(np.array([[float(cell) for cell in line] for line in list(csv.reader(opened))[1:]]))
-    thresholds, fractions = np.mean(tables, axis=0).T
-    return Curve(thresholds, fractions, row.age)
-
-
-def _text(seeds: Sequence[int]) -> str:
-    return " ".join(map(str, seeds))

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import pytest
-
-from csm.errors import DataError
-from csm.evaluation.tables import markdown_table, paper_table
+from csm.evaluation.tables import markdown_table
 from tests.evaluation.test_report import row
 
 
@@ -20,21 +17,3 @@ def test_markdown_has_one_line_per_row_and_states_the_protocol() -> None:
     assert (found["AGE x1000"], found["exact %"], found["pairs"]) == ("9.7 ± 0.3", "61.0", "380")
     assert found["distance, normaliser"] == "exact, diameter"
     assert dict(zip(head, second, strict=True))["AGE x1000"] == "9.7"
-
-
-def test_the_paper_stands_above_ours() -> None:
-    rows = [row(), row(test="FAUST 10000", age=0.0151), row(method="ACD", train="none", age=0.08)]
-    table = paper_table(rows, {("CSMCNN", "FAUST 6890"): 0.010, ("CSMCNN", "FAUST 10000"): 0.015})
-    head, _, *lines = [cells(line) for line in table.splitlines()]
-    assert head[2:] == ["FAUST 6890", "FAUST 10000"]
-    assert "diameter" in head[0]
-    assert lines == [
-        ["CSMCNN", "paper", "10.0", "15.0"],
-        ["CSMCNN", "ours", "9.7 ± 0.3", "15.1 ± 0.3"],
-        ["ACD", "ours", "80.0 ± 0.3", "-"],
-    ]
-
-
-def test_different_distances_do_not_share_a_table() -> None:
-    with pytest.raises(DataError, match="one kind"):
-        paper_table([row(), row(test="b", distance="edge")], {})
