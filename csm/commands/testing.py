@@ -95,7 +95,9 @@ def test_on(
         return maps.between(source.name, target.name, at=source.truth.known)
 
     workers = processes(datamodule.workers, len(names))
-    evaluation = evaluate_matches([item.shape for item in loaded], match, protocol, workers=workers)
+    evaluation = evaluate_matches(
+        [item.shape for item in loaded], match, protocol, workers=workers, memo=datamodule.store
+    )
     training = module.hparams["training"]
     row = result_row(
         [evaluation],

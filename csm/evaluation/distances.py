@@ -9,8 +9,13 @@ import numpy as np
 
 from csm._types import BoolArray, FloatArray, IntArray
 from csm.evaluation.metrics import FLIP_MARGIN, flipped
+from csm.evaluation.remembered import RememberedGeodesics
 from csm.mesh.shape import Mesh
+from csm.operators.bundle import Memo
 from csm.operators.geodesic import Geodesics, Method, geodesics
+
+KEPT_POINTS = 500
+"""Rows of so many points are kept at most: at 15,000 vertices 30 MB per shape."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +72,9 @@ class TargetErrors:
     errors: tuple[PointErrors, ...]
 
 
-def target_errors(mesh: Mesh, method: Method, normaliser: str, sources: Sequence[MatchedPoints]) -> TargetErrors:
+def target_errors(
+    mesh: Mesh, method: Method, normaliser: str, sources: Sequence[MatchedPoints], memo: Memo | None = None
+) -> TargetErrors:
     """Measure the matches of several source shapes on one target.
 
     Only pairs of vertices that were missed are measured, from the true vertex to the matched one, each pair once.
@@ -82,8 +89,12 @@ def target_errors(mesh: Mesh, method: Method, normaliser: str, sources: Sequence
         Field of `Lengths` that the margin of a flip (`metrics.FLIP_MARGIN`) is a fraction of.
     sources
         Matches of each source shape.
+    memo
+        Where distances from the points are kept for the next question, if there are at most `KEPT_POINTS` of them.
     """
-    surface = geodesics(mesh, method)
+    surface: Geodesics = geodesics(mesh, method)
+    if memo is not None and len(np.unique(np.concatenate([p.truth for p in sources]))) <= KEPT_POINTS:
+        surface = RememberedGeodesics(surface, mesh, memo)
     lengths = Lengths(surface.diameter(), float(np.sqrt(mesh.area)))
     margin = FLIP_MARGIN * float(getattr(lengths, normaliser))
     missed = [p.truth != p.matched for p in sources]

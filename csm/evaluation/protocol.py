@@ -24,6 +24,7 @@ from csm.evaluation.distances import MatchedPoints, TargetErrors, target_errors
 from csm.evaluation.metrics import FLIP_MARGIN
 from csm.evaluation.results import Evaluation, PairErrors, summarise
 from csm.mesh.correspondence import ground_truth
+from csm.operators.bundle import Memo
 from csm.operators.geodesic import Method
 
 Normaliser: TypeAlias = Literal["diameter", "sqrt_area"]
@@ -131,7 +132,13 @@ Matcher: TypeAlias = Callable[[Shape, Shape], IntArray]
 
 
 def evaluate_matches(
-    shapes: Sequence[Shape], match: Matcher, protocol: Protocol, progress: bool = True, *, workers: int = 1
+    shapes: Sequence[Shape],
+    match: Matcher,
+    protocol: Protocol,
+    progress: bool = True,
+    *,
+    workers: int = 1,
+    memo: Memo | None = None,
 ) -> Evaluation:
     """Match every pair of the protocol and measure the errors.
 
@@ -150,6 +157,9 @@ def evaluate_matches(
         Processes of one thread each that measure distances while this one goes on matching; up to 1 measures in this
         process.  More need the caller's script to be importable (``if __name__ == "__main__"``), as with any process
         pool.
+    memo
+        Such as a store: keeps distances from the protocol's points, if they are few, for the next evaluation on the
+        same shapes, whatever is matched then.
 
     Raises
     ------
@@ -169,7 +179,7 @@ def evaluate_matches(
             for source in sources:
                 bar.set_postfix_str(f"{source} -> {target}")
                 asked[target].append(matched_points(by_name[source], by_name[target], match))
-            args = by_name[target].mesh, protocol.distance, protocol.normaliser, asked[target]
+            args = by_name[target].mesh, protocol.distance, protocol.normaliser, asked[target], memo
             jobs[target] = submit(target_errors, *args)
             jobs[target].add_done_callback(partial(_advance, bar, len(sources)))
         answers = {target: job.result() for target, job in jobs.items()}
