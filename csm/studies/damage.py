@@ -79,6 +79,18 @@ def damage_rows(
     return [{"damage": title, "method": method, **_summary(cells)} for (title, method), cells in found.items()]
 
 
+def by_method(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return a line per method with its error by every damage, such as "5.2 ± 0.3", and the rows as its `cells`."""
+    lines: dict[str, dict[str, Any]] = {}
+    for row in rows:
+        line = lines.setdefault(row["method"], {"method": row["method"], "cells": []})
+        line["cells"].append(dict(row))
+        if row["error"] is not None:
+            spread = "" if row["standard error"] is None else f" ± {row['standard error']:.1f}"
+            line[row["damage"]] = f"{row['error']:.1f}{spread}"
+    return list(lines.values())
+
+
 def _cells(
     context: Context,
     target: Shape,

@@ -13,7 +13,7 @@ from csm.mesh.perturb import with_noise
 from csm.operators.geodesic import Method
 from csm.studies.bodies import Bodies, Source, find_bodies
 from csm.studies.contestants import contestants
-from csm.studies.damage import Plan, damage_rows
+from csm.studies.damage import Plan, by_method, damage_rows
 from csm.studies.study import Context, Findings
 from csm.viewer.figures import save_figure
 from csm.viewer.style import line_style, new_figure
@@ -59,27 +59,25 @@ def run(
     methods = contestants(descriptors, checkpoints, context, bodies)
     damages = {f"{strength:g}": partial(with_noise, strength=float(strength)) for strength in sorted(strengths)}
     rows = damage_rows(context, bodies, damages, methods, Plan(n_pairs, points, distance))
-    rows = [{"noise": float(row.pop("damage")), **row} for row in rows]
     path = context.out / "figure12.png"
     save_figure(path, _draw(rows, list(methods)))
     title = f"Matching onto noisy shapes ({bodies.title}), errors in thousandths of the diameter."
     notes = (
         f"{n_pairs} ordered pairs of the last twenty bodies, {points} points each, distance {distance} on the target "
-        "without noise. Noise: standard deviation of each coordinate, in mean edge lengths of the target. ± is the "
-        "standard error over targets.",
+        "without noise. Columns: standard deviation of the noise of each coordinate, in mean edge lengths of the "
+        "target. ± is the standard error over targets.",
     )
-    shown = ("noise", "method", "error", "standard error", "exact %", "within 5 % of the diameter, %")
-    return Findings("figure12", title, shown, rows, notes, (path,))
+    return Findings("figure12", title, ("method", *damages), by_method(rows), notes, (path,))
 
 
 def _draw(rows: Sequence[Mapping[str, Any]], methods: Sequence[str]) -> Figure:
-    figure, axes = new_figure(6.2, 4.0)
+    figure, axes = new_figure(7.6, 4.0)
     for k, method in enumerate(methods):
         known = [row for row in rows if row["method"] == method and row["error"] is not None]
-        strengths, errors = [row["noise"] for row in known], [row["error"] for row in known]
+        strengths, errors = [float(row["damage"]) for row in known], [row["error"] for row in known]
         axes.plot(strengths, errors, marker="o", markersize=4, label=method, **line_style(k))
     axes.set_ylim(bottom=0)
     axes.set_xlabel("noise (mean edge lengths)")
     axes.set_ylabel("mean error (thousandths of the diameter)")
-    axes.legend(frameon=False)
+    figure.legend(loc="outside right center", frameon=False)
     return figure

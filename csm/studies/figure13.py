@@ -13,7 +13,7 @@ from csm.mesh.shape import Mesh
 from csm.operators.geodesic import Method
 from csm.studies.bodies import Bodies, Source, find_bodies
 from csm.studies.contestants import contestants
-from csm.studies.damage import Damage, Plan, damage_rows
+from csm.studies.damage import Damage, Plan, by_method, damage_rows
 from csm.studies.study import Context, Findings
 from csm.viewer.comparisons import dots_figure
 from csm.viewer.figures import save_figure
@@ -75,8 +75,7 @@ def run(
         "way along it is at least half of sqrt(area). ± is the standard error over targets.",
         *sorted({f"{row['method']}, {row['damage']}: {row['failed']}" for row in rows if "failed" in row}),
     )
-    shown = ("damage", "method", "error", "standard error", "exact %", "within 5 % of the diameter, %", "vertices left")
-    return Findings("figure13", title, shown, rows, notes, (path,))
+    return Findings("figure13", title, ("method", *damages), by_method(rows), notes, (path,))
 
 
 def cut_extremity(mesh: Mesh, fraction: float) -> Damaged:

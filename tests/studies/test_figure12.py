@@ -11,8 +11,11 @@ SMALL = {"descriptors": ["acd_isotropic"], "n_pairs": 2, "points": 40, "distance
 
 def test_errors_grow_with_the_noise_and_there_is_a_picture(tmp_path):
     found = run(toy_context(tmp_path), source=toy_bodies(), strengths=[1.0, 0.0, 0.2], **SMALL)
-    assert [row["noise"] for row in found.rows] == [0.0, 0.2, 1.0]
-    none, _, most = (row["error"] for row in found.rows)
+    (line,) = found.rows
+    assert found.columns == ("method", "0", "0.2", "1")
+    assert [row["damage"] for row in line["cells"]] == ["0", "0.2", "1"]
+    none, _, most = (row["error"] for row in line["cells"])
+    assert line["1"].startswith(f"{most:.1f}")
     assert most > none + 20
     assert found.pictures[0].is_file()
 

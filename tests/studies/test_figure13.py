@@ -15,7 +15,10 @@ SMALL = {"descriptors": ["acd_isotropic"], "n_pairs": 2, "points": 40, "distance
 def test_every_damage_has_its_row_and_what_it_leaves(tmp_path, monkeypatch):
     monkeypatch.setattr(figure13, "grown_together", _too_round)
     found = run(toy_context(tmp_path), source=toy_bodies(), **SMALL)
-    none, cut, grown = found.rows
+    (line,) = found.rows
+    none, cut, grown = line["cells"]
+    assert found.columns == ("method", "none", "20 % cut away", "grown together")
+    assert "grown together" not in line
     assert (none["vertices left"], none["damage"]) == (1, "none")
     assert 0.6 < cut["vertices left"] < 0.95
     assert cut["error"] > none["error"]
