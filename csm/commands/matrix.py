@@ -163,7 +163,7 @@ def training_of(cfg: DictConfig) -> dict[str, Any]:
         found |= {f"{group}.{key}": value for key, value in plain[group].items() if key not in _PLACES}
     if found.get("data.split"):
         found["data.split"] = Path(found["data.split"]).name
-    return found | {f"trainer.{key}": plain["trainer"][key] for key in ("max_epochs", "max_time")}
+    return found | {f"trainer.{key}": plain["trainer"][key] for key in ("max_epochs", "max_time", "gradient_clip_val")}
 
 
 main = command("matrix")(run)
