@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from scipy.spatial import cKDTree
 
 from csm._types import FloatArray
 from csm.data.shapeset import Shape
@@ -14,6 +15,7 @@ from csm.errors import ConfigError
 from csm.evaluation.distances import MatchedPoints, target_errors
 from csm.evaluation.matching import nearest
 from csm.mesh.correspondence import ground_truth
+from csm.mesh.shape import Mesh
 from csm.operators.geodesic import Method
 from csm.studies.bodies import Bodies, Source, find_bodies
 from csm.studies.contestants import Contestant, contestants
@@ -22,6 +24,9 @@ from csm.viewer.camera import View
 from csm.viewer.colors import ERROR_COLORMAP
 from csm.viewer.figures import save_figure
 from csm.viewer.grid import Panel, Scale, scalar_grid
+
+NEAR = 0.05
+"""How far, in units of sqrt(area), a picture takes an error over to vertices without a counterpart."""
 
 
 def run(
@@ -70,7 +75,8 @@ def run(
         here, there = shapes.load(bodies.body), shapes.load(bodies.other_person)
         for name, errors in zip(methods, vertex_errors(here, there, list(methods.values()), distance), strict=True):
             table[name, title] = {"method": name, "mesh": title, **_summary(errors[np.isfinite(errors)])}
-            grid[name].append(Panel(here.mesh, errors))
+            mesh = here.mesh.unit_area()  # so that all triangulations of a body are drawn of one size
+            grid[name].append(Panel(mesh, filled(mesh, errors)))
     path = context.out / "figure10.png"
     scale = Scale("geodesic error (fraction of the diameter)", high, ERROR_COLORMAP)
     save_figure(path, scalar_grid(grid, list(bodies.resolutions), scale, view=View(up=bodies.up), size=size))
@@ -98,6 +104,13 @@ def vertex_errors(here: Shape, there: Shape, methods: Sequence[Contestant], dist
         values[truth.source] = errors.distance / measured.lengths.diameter
         found.append(values)
     return found
+
+
+def filled(mesh: Mesh, values: FloatArray) -> FloatArray:
+    """Give vertices without a value (NaN), on a mesh of unit area, that of the nearest known one up to `NEAR`."""
+    known = np.flatnonzero(np.isfinite(values))
+    distances, places = cKDTree(mesh.vertices[known]).query(mesh.vertices)
+    return np.where(distances <= NEAR, values[known[places]], np.nan)
 
 
 def _summary(errors: FloatArray) -> dict[str, float]:

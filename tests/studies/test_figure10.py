@@ -6,7 +6,8 @@ import torch
 
 from csm.errors import ConfigError
 from csm.studies.contestants import Contestant
-from csm.studies.figure10 import run, vertex_errors
+from csm.studies.figure10 import NEAR, filled, run, vertex_errors
+from tests.shapes import blob
 from tests.studies.toys import toy_bodies, toy_context
 
 
@@ -39,3 +40,14 @@ def test_errors_lie_at_the_vertices_that_were_matched():
         assert np.isfinite(values[:162]).all()
         assert np.isnan(values[162:]).all()
         assert (values[:162] == 0).sum() == exact
+
+
+def test_a_picture_takes_errors_over_to_near_vertices_only():
+    mesh = blob(3).unit_area()
+    values = np.full(mesh.n_vertices, np.nan)
+    values[0] = 0.5
+    distances = np.linalg.norm(mesh.vertices - mesh.vertices[0], axis=1)
+    drawn = filled(mesh, values)
+    assert (distances <= NEAR).sum() > 1
+    np.testing.assert_array_equal(drawn[distances <= NEAR], 0.5)
+    assert np.isnan(drawn[distances > NEAR]).all()
