@@ -42,8 +42,12 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     failures: list[str] = []
     for name, overrides in chosen_rows(cfg).items():
         for seed in cfg.seeds:
+            place = folder / name / f"seed{seed}"
+            if not cfg.train and not (place / "model.ckpt").exists():
+                _log.warning("%s, seed %s: not trained yet, left out (train=false)", name, seed)
+                continue
             try:
-                rows += Cells(cfg, name, overrides, int(seed), folder / name / f"seed{seed}").fill()
+                rows += Cells(cfg, name, overrides, int(seed), place).fill()
             except CsmError as error:
                 failures.append(f"{name}, seed {seed}: {error}")
                 _log.error("%s", failures[-1])
@@ -55,6 +59,8 @@ def run(cfg: DictConfig) -> dict[str, Any]:
         add_rows(cfg.results, table)
     if failures:
         raise ConfigError(f"{len(failures)} rows of the matrix failed, the others are done:\n" + "\n".join(failures))
+    if not table:
+        raise ConfigError(f"{folder} has no trained network of these rows and seeds, and train=false makes none")
     return {f"age/{row.method}/{row.test}": row.age for row in table}
 
 

@@ -149,7 +149,7 @@ def test_a_sweep_goes_on_after_a_failing_job_and_ends_in_one_table(bench, capsys
     assert float(rows[2]["age/toys"]) > 0
 
 
-def test_a_matrix_is_resumed_cell_by_cell(bench, monkeypatch):
+def test_a_matrix_is_resumed_cell_by_cell(bench, capsys):
     row = "+rows.toy=[" + ",".join(f"'{x}'" for x in (*SMALL, "data.root=toys", "trainer.max_epochs=2")) + "]"
     arguments = ["seeds=[0,1]", "folder=cells", "results=matrix.json", row]
     bench.run("matrix", *arguments)
@@ -166,6 +166,12 @@ def test_a_matrix_is_resumed_cell_by_cell(bench, monkeypatch):
     assert not (bench.folder / "cells/toy/seed1/model.ckpt").exists()
     (again,) = read_rows(bench.folder / "matrix.json")
     assert again.age == pytest.approx(table.age)
+    bench.run("matrix", *arguments[1:], "seeds=[0,1]", "train=false")  # of seed 1 there is a cell, but no network
+    (left,) = read_rows(bench.folder / "cells/matrix.json")
+    assert left.seeds == (0,)
+    with pytest.raises(SystemExit):
+        bench.run("matrix", *arguments, "folder=empty", "train=false")
+    assert "no trained network" in capsys.readouterr().err
 
 
 def test_a_matrix_fills_only_the_rows_asked_for_and_ends_a_training_in_time(bench, capsys):
