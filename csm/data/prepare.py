@@ -102,8 +102,9 @@ def prepare_shape(shape: Shape, recipe: Recipe, store: Store) -> Prepared:
     """Return one shape with features and basis, from the store where they are there."""
     features = compute_features(shape.mesh, recipe.descriptor, store)
     operators = Operators(shape.mesh, memo=store)
+    basis = operators.lbo(recipe.basis_k)  # before a stencil asks for more pairs, or the store would never hold these
     stencils = {s.name: _arrays_of(s, operators, store) for s in recipe.stencils}
-    return Prepared(shape, features, operators.lbo(recipe.basis_k), stencils)
+    return Prepared(shape, features, basis, stencils)
 
 
 def _arrays_of(stencil: Stencil, operators: Operators, store: Store) -> Arrays:

@@ -36,7 +36,7 @@ class Contender:
 CONTENDERS: Mapping[str, Contender] = {
     "csmcnn": Contender("CSMCNN", "csmcnn", "acd_release", {"momentum": 1e-3, "eps": 1e-3}, paper_millions=1.90),
     "add": Contender("ADD", "mlp", "add", {"widths": (256, 256, 256, 256)}),
-    "mgcn": Contender("MGCN", "mgcn", "weds", basis_k=300, paper_millions=3.03),
+    "mgcn": Contender("MGCN", "mgcn", "weds", basis_k=301, paper_millions=3.03),
     "acscnn": Contender("ACSCNN", "acscnn", "acd_release", paper_millions=4.80),
     "splinecnn": Contender("SplineCNN", "splinecnn", "constant", paper_millions=4.11),
     "chebynet": Contender("ChebyNet", "chebynet", "constant"),

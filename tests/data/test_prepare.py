@@ -16,6 +16,7 @@ from csm.descriptors import ACD
 from csm.mesh.io import write_mesh
 from csm.mesh.shape import Mesh
 from csm.operators.bundle import Operators
+from csm.operators.wavelets import Wavelets
 from tests.toyset import write_toys
 
 RECIPE = Recipe(ACD(angles=3, k=5, order=2), 10)
@@ -37,6 +38,12 @@ def test_a_second_run_finds_everything(toys, tmp_path, workers):
     second = prepare(jobs(toys), RECIPE, store, workers=workers, progress=False)
     assert (first.made, first.present, first.failures) == (4, 0, [])
     assert (second.made, second.present) == (0, 4)
+
+
+def test_a_stencil_of_more_eigenpairs_than_the_basis_leaves_the_basis_in_the_store(toys, tmp_path):
+    recipe, store = Recipe(ACD(angles=3, k=5, order=2), 10, (Wavelets(k=12, n_filters=4),)), Store(tmp_path / "store")
+    assert prepare(jobs(toys), recipe, store, workers=0, progress=False).made == 4
+    assert prepare(jobs(toys), recipe, store, workers=0, progress=False).present == 4
 
 
 def test_entries_that_are_there_are_not_read(toys, tmp_path, monkeypatch):
