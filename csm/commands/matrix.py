@@ -90,7 +90,7 @@ class Cells:
     def __init__(self, cfg: DictConfig, name: str, overrides: Sequence[str], seed: int, folder: Path) -> None:
         self.name, self.seed, self.folder, self.table = name, seed, folder, str(cfg.table)
         self.protocol = protocol_of(cfg.metric)
-        self.matchings = list(cfg.matching)
+        self.matchings: list[Matching] = list(cfg.matching)
         last = folder / "checkpoints" / "last.ckpt"
         self.train_cfg = compose("train", overrides=[*overrides, *cfg.overrides])
         with open_dict(self.train_cfg):
@@ -142,23 +142,38 @@ class Cells:
             )
 
     def fill(self) -> list[ResultRow]:
-        """Return the row of every test set, from its file where that answers the same question."""
+        """Return the rows of every test set, one matching after the other, from files that answer the same question."""
         self.require_same_training()
-        return [self._cell(name, matching) for matching in self.matchings for name in self.datamodule.test_sets]
+        rows = {
+            (test, matching): row for test in self.datamodule.test_sets for matching, row in self._cells(test).items()
+        }
+        return [rows[test, matching] for matching in self.matchings for test in self.datamodule.test_sets]
 
-    def _cell(self, test: str, matching: Matching) -> ResultRow:
+    def _cells(self, test: str) -> dict[Matching, ResultRow]:
+        """Return the rows of one test set, whose shapes are described once for all that is missing."""
+        rows = {matching: self._kept(self._file(test, matching)) for matching in self.matchings}
+        missing = [matching for matching, row in rows.items() if row is None]
+        if missing:
+            shapes = self.datamodule.test_sets[test]
+            for tested in test_on(self.module, self.datamodule, shapes, self.protocol, self.table, missing):
+                path = self._file(test, tested.matching)
+                write_rows(path, [tested.row])
+                write_curves_csv(path.with_suffix(".cqc.csv"), {test: tested.evaluation})
+                rows[tested.matching] = tested.row
+        return {matching: row for matching, row in rows.items() if row is not None}
+
+    def _file(self, test: str, matching: Matching) -> Path:
         kind = "" if matching == "nearest" else f"_{matching}"
-        path = self.folder / f"{test}_{self.protocol.distance}_{self.protocol.normaliser}{kind}.json"
-        if path.exists():
-            (row,) = read_rows(path)
-            if row.protocol == self.protocol.describe(row.pairs):
-                return row
-            _log.warning("%s answers another protocol (%s); it is made again", path, row.protocol)
-        shapes = self.datamodule.test_sets[test]
-        tested = test_on(self.module, self.datamodule, shapes, self.protocol, self.table, matching)
-        write_rows(path, [tested.row])
-        write_curves_csv(path.with_suffix(".cqc.csv"), {test: tested.evaluation})
-        return tested.row
+        return self.folder / f"{test}_{self.protocol.distance}_{self.protocol.normaliser}{kind}.json"
+
+    def _kept(self, path: Path) -> ResultRow | None:
+        if not path.exists():
+            return None
+        (row,) = read_rows(path)
+        if row.protocol == self.protocol.describe(row.pairs):
+            return row
+        _log.warning("%s answers another protocol (%s); it is made again", path, row.protocol)
+        return None
 
 
 def training_of(cfg: DictConfig) -> dict[str, Any]:

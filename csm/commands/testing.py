@@ -72,14 +72,15 @@ def test_on(
     shapes: ShapeSet,
     protocol: Protocol,
     table: str,
-    matching: Matching,
-) -> Tested:
-    """Compute the learned descriptor of every test shape of a set, match, and measure.
+    matchings: Sequence[Matching],
+) -> list[Tested]:
+    """Compute the learned descriptor of every test shape of a set, then match in each way and measure.
 
     Rows of a matching other than "nearest" say so in the name of their method.
     """
-    if matching not in get_args(Matching):
-        raise ConfigError(f"matching={matching!r}; wanted {' or '.join(get_args(Matching))}")
+    for matching in matchings:
+        if matching not in get_args(Matching):
+            raise ConfigError(f"matching={matching!r}; wanted {' or '.join(get_args(Matching))}")
     names = datamodule.test_names(shapes)
     datamodule.fill([Job(shapes, name) for name in names])
     loaded = [datamodule.load(shapes, name) for name in names]
@@ -87,39 +88,46 @@ def test_on(
         item.sample.name: module.describe(item.sample)
         for item in progress_bar(loaded, desc=f"describe {shapes.name}", unit="shape", leave=False)
     }
+    tested = []
+    for matching in matchings:
+        said = {name: module.votes(d) for name, d in descriptors.items()} if matching == "argmax" else None
+        maps = Maps(descriptors, said)
+        evaluation = _evaluate(maps, [item.shape for item in loaded], protocol, datamodule)
+        row = _row(evaluation, module.hparams["training"], shapes.name, table, matching)
+        tested.append(Tested(row, evaluation, [item.shape for item in loaded], maps, matching))
+    return tested
 
-    said = {name: module.votes(d) for name, d in descriptors.items()} if matching == "argmax" else None
-    maps = Maps(descriptors, said)
 
+def _evaluate(
+    maps: Maps, shapes: Sequence[Shape], protocol: Protocol, datamodule: CorrespondenceDataModule
+) -> Evaluation:
     def match(source: Shape, target: Shape) -> IntArray:
         return maps.between(source.name, target.name, at=source.truth.known)
 
-    workers = processes(datamodule.workers, len(names))
-    evaluation = evaluate_matches(
-        [item.shape for item in loaded], match, protocol, workers=workers, memo=datamodule.store
-    )
-    training = module.hparams["training"]
-    row = result_row(
+    workers = processes(datamodule.workers, len(shapes))
+    return evaluate_matches(shapes, match, protocol, workers=workers, memo=datamodule.store)
+
+
+def _row(evaluation: Evaluation, training: Mapping[str, Any], test: str, table: str, matching: Matching) -> ResultRow:
+    return result_row(
         [evaluation],
         provenance(),
         table=table,
         method=training["name"] + ("" if matching == "nearest" else f", {matching}"),
         train=training["set"],
-        test=shapes.name,
+        test=test,
         seeds=[training["seed"]],
         epochs=training["epochs"],
     )
-    return Tested(row, evaluation, [item.shape for item in loaded], maps, matching)
 
 
 def test_all(cfg: DictConfig, module: CSMModule, datamodule: CorrespondenceDataModule) -> list[Tested]:
-    """Test on every test set of a data module, by the protocol of the configuration."""
-    protocol = protocol_of(cfg.metric)
-    return [
-        test_on(module, datamodule, shapes, protocol, cfg.table, matching)
-        for matching in cfg.matching
-        for shapes in datamodule.test_sets.values()
+    """Test on every test set of a data module, by the protocol of the configuration; one matching after the other."""
+    protocol, matchings = protocol_of(cfg.metric), list(cfg.matching)
+    tested = [
+        test_on(module, datamodule, shapes, protocol, cfg.table, matchings) for shapes in datamodule.test_sets.values()
     ]
+    return [by_set[i] for i in range(len(matchings)) for by_set in tested]
 
 
 def numbers(tested: Sequence[Tested]) -> dict[str, float]:
