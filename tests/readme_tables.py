@@ -1,7 +1,7 @@
 """The tables of the README, made from the json files under results/.
 
-``make tables`` rewrites every block between ``<!-- table: FILE -->`` (result rows) or ``<!-- study: FILE -->`` (what
-``csm reproduce`` found) and ``<!-- end -->``; a test compares them.
+``make tables`` rewrites every block between ``<!-- study: FILE -->`` (what ``csm reproduce`` found) and
+``<!-- end -->``; a test compares them.
 """
 
 from __future__ import annotations
@@ -10,12 +10,10 @@ import json
 import re
 from pathlib import Path
 
-from csm.evaluation.report import read_rows
-from csm.studies.learned import findings
 from csm.studies.study import Findings
 
 ROOT = Path(__file__).resolve().parent.parent
-BLOCK = re.compile(r"(<!-- (table|study): (\S+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+BLOCK = re.compile(r"(<!-- study: (\S+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
 
 def study(path: Path) -> str:
@@ -27,11 +25,7 @@ def study(path: Path) -> str:
 
 def with_tables(text: str) -> str:
     """Return the text with every block made anew."""
-    return BLOCK.sub(lambda m: f"{m[1]}{_content(m[2], ROOT / m[3])}{m[5]}", text)
-
-
-def _content(kind: str, path: Path) -> str:
-    return study(path) if kind == "study" else f"{findings(path.stem, read_rows(path)).markdown()}\n"
+    return BLOCK.sub(lambda m: f"{m[1]}{study(ROOT / m[2])}{m[4]}", text)
 
 
 if __name__ == "__main__":
