@@ -1,19 +1,48 @@
 """The tables of the README, made from the json files under results/.
 
-``make tables`` rewrites every block between ``<!-- study: FILE -->`` (what ``csm reproduce`` found) and
-``<!-- end -->``; a test compares them.
+``make tables`` rewrites every block between ``<!-- study: FILE -->`` (what ``csm reproduce`` found) or
+``<!-- headline -->`` (a few numbers of Tables 1 and 4) and ``<!-- end -->``; a test compares them.
 """
 
 from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 from csm.studies.study import Findings
 
 ROOT = Path(__file__).resolve().parent.parent
-BLOCK = re.compile(r"(<!-- study: (\S+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+BLOCK = re.compile(r"(<!-- (?:study: (\S+)|headline) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+UNTRAINED = {"acd": "ACD", "asmwd": "ASMWD, the next best of eleven families"}
+TRAINED = {"faust_paper": "CSMCNN", "faust_acscnn": "ACSCNN, the best at 6,890"}
+
+
+def headline() -> str:
+    """Return the errors of the best descriptors and of two networks across resolutions, in two small tables."""
+    table1, table4 = (
+        json.loads((ROOT / f"results/{name}.json").read_text(encoding="utf-8")) for name in ("table1", "table4")
+    )
+    sets = {"faust": "FAUST", "shrec19": "SHREC'19", "tosca": "TOSCA"}
+    lines = _head("without training", sets.values())
+    for name, title in UNTRAINED.items():
+        (row,) = (row for row in table1["rows"] if row["descriptor"] == name)
+        lines.append(_line(title, [row[key]["age"] for key in sets]))
+    lines += ["", *_head("trained on FAUST at 6,890 vertices, tested at", ["6,890", "10,000", "15,000"])]
+    for name, title in TRAINED.items():
+        (row,) = (row for row in table4["rows"] if row["row"] == name)
+        lines.append(_line(title, [cell["age"] for cell in row["rows"] if cell["method"] == name]))
+    return "\n".join(lines) + "\n"
+
+
+def _head(first: str, others: Iterable[str]) -> list[str]:
+    titles = [first, *others]
+    return [f"| {' | '.join(titles)} |", "|" + "---|" * len(titles)]
+
+
+def _line(title: str, ages: list[float]) -> str:
+    return "| " + " | ".join([title, *(f"{1000 * age:.1f}" for age in ages)]) + " |"
 
 
 def study(path: Path) -> str:
@@ -25,7 +54,7 @@ def study(path: Path) -> str:
 
 def with_tables(text: str) -> str:
     """Return the text with every block made anew."""
-    return BLOCK.sub(lambda m: f"{m[1]}{study(ROOT / m[2])}{m[4]}", text)
+    return BLOCK.sub(lambda m: f"{m[1]}{study(ROOT / m[2]) if m[2] else headline()}{m[4]}", text)
 
 
 if __name__ == "__main__":
