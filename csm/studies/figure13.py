@@ -62,11 +62,12 @@ def run(
     damages["grown together"] = grown_together
     rows = damage_rows(context, bodies, damages, methods, Plan(n_pairs, points, distance))
     label, path = "mean error (thousandths of the diameter)", context.out / "figure13.png"
+    errors = {(row["method"], row["damage"]): row["error"] for row in rows}
     drawn = {
-        method: [row["error"] if row["error"] is not None else float("nan") for row in rows if row["method"] == method]
-        for method in methods
+        damage: [float("nan") if (error := errors[method, damage]) is None else error for method in methods]
+        for damage in damages
     }
-    save_figure(path, dots_figure(list(damages), {label: drawn}))
+    save_figure(path, dots_figure(list(methods), {label: drawn}))
     title = f"Matching onto damaged shapes ({bodies.title}), errors in thousandths of the diameter."
     notes = (
         f"{n_pairs} ordered pairs of the last twenty bodies, {points} points left on the target each, distance "

@@ -15,6 +15,7 @@ from csm.errors import ConfigError
 from csm.viewer.figures import Curve
 from csm.viewer.style import CYCLE, line_style, plain_axes
 
+_LEGEND_COLUMNS = 4
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 
@@ -54,7 +55,8 @@ def dots_figure(names: Sequence[str], panels: Mapping[str, Mapping[str, Sequence
     grid[0].set_ylim(len(names) - 0.5, -0.5)
     handles, labels = grid[0].get_legend_handles_labels()
     if len(labels) > 1:
-        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False, fontsize=8)
+        columns = len(labels) if len(labels) <= _LEGEND_COLUMNS else _LEGEND_COLUMNS - 1
+        figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False, fontsize=8)
     return figure
 
 
