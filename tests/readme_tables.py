@@ -16,7 +16,7 @@ from csm.studies.study import Findings
 ROOT = Path(__file__).resolve().parent.parent
 BLOCK = re.compile(r"(<!-- (?:study: (\S+)|headline) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 UNTRAINED = {"acd": "ACD", "asmwd": "ASMWD, the next best of eleven families"}
-TRAINED = {"faust_paper": "CSMCNN", "faust_acscnn": "ACSCNN, the best at 6,890"}
+TRAINED = {"faust_paper": "CSMCNN", "faust_acscnn": "ACSCNN, the paper's best at 6,890"}
 
 
 def headline() -> str:
