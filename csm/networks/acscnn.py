@@ -155,4 +155,5 @@ class ACSCNN(nn.Module):
 def laplacians_of(surface: Surface) -> tuple[Tensor, ...]:
     """Return the stencil "albo" as sparse tensors, (N, N) each and symmetric, one per angle."""
     stencil = surface.stencil("albo")
-    return tuple(symmetric_matrix(stencil["indptr"], stencil["indices"], values) for values in stencil["values"])
+    indptr, indices = stencil["indptr"].int(), stencil["indices"].int()  # once for all angles
+    return tuple(symmetric_matrix(indptr, indices, values) for values in stencil["values"])
