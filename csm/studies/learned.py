@@ -48,7 +48,7 @@ def findings(name: str, rows: Sequence[ResultRow], pictures: Sequence[Path] = ()
     ]
     title = (
         f"Mean geodesic error in thousandths of the {rows[0].normaliser}; trained on {rows[0].train}, tested on "
-        + (f"{', '.join(tests)}.")
+        f"{', '.join(tests)}."
     )
     notes = [
         "Matched by the nearest learned descriptor"

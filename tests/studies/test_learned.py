@@ -6,11 +6,12 @@ import pytest
 
 from csm.evaluation.report import ResultRow
 from csm.studies.learned import curves, dots, findings
+from tests.evaluation.test_report import row as result_row
 
 
 @pytest.fixture
 def rows(tmp_path) -> list[ResultRow]:
-    row = ResultRow(
+    row = result_row(
         table="table5",
         method="scape_mgcn",
         train="SCAPE_5000",
@@ -20,13 +21,6 @@ def rows(tmp_path) -> list[ResultRow]:
         exact_match=0.25,
         seeds=(0, 1),
         epochs=3,
-        pairs=380,
-        distance="exact",
-        normaliser="diameter",
-        command="csm matrix",
-        commit="abc",
-        versions={},
-        seconds=1.0,
         protocol="some pairs",
     )
     for seed, half in ((0, 0.4), (1, 0.8)):
