@@ -71,7 +71,8 @@ class FaustDataModule(CorrespondenceDataModule):
     def __init__(
         self, root: str | Path, train: int = 6890, test: Sequence[int] = (6890, 10000, 15000), **options: Any
     ) -> None:
-        super().__init__(self._set(root, train), [self._set(root, n) for n in test], **options)
+        sets = {n: self._set(root, n) for n in (train, *test)}
+        super().__init__(sets[train], [sets[n] for n in test], **options)
 
     @staticmethod
     def _set(root: str | Path, n_vertices: int) -> FolderSet:

@@ -86,8 +86,8 @@ def list_files(folder: Path, *suffixes: str) -> list[Path]:
     """
     if not folder.is_dir():
         return []
-    found = [p for p in folder.iterdir() if p.is_file() and not p.name.startswith(".")]
-    return sorted((p for p in found if p.suffix.lower() in suffixes), key=lambda p: natural_key(p.name))
+    named = (p for p in folder.iterdir() if p.suffix.lower() in suffixes and not p.name.startswith("."))
+    return sorted((p for p in named if p.is_file()), key=lambda p: natural_key(p.name))
 
 
 def list_folders(folder: Path, depth: int = 1) -> list[Path]:
