@@ -82,8 +82,9 @@ def run(
     save_figure(path, scalar_grid(grid, list(bodies.resolutions), scale, view=View(up=bodies.up), size=size))
     title = f"{bodies.body} matched onto {bodies.other_person} ({bodies.title}), thousandths of the diameter."
     notes = (
-        f"Errors at all vertices with a known counterpart, {distance} distances on the target, drawn where the matched "
-        "vertex is; a vertex without a counterpart is grey. Both shapes are triangulated alike in every column.",
+        f"Errors at all vertices with a known counterpart, {distance} distances on the target, drawn on the body that "
+        f"is matched. A vertex without a counterpart looks like the nearest one that has one within {NEAR} sqrt(area), "
+        "and is grey beyond. Both bodies are triangulated alike in every column.",
         "The paper's own figure could not be seen, so this is what we take it for: errors across resolutions.",
     )
     rows = [table[name, title] for name in methods for title in bodies.resolutions]
