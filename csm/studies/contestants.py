@@ -66,8 +66,12 @@ def contestants(
 
 
 def trained_on(name: str, out: Path) -> dict[str, CSMModule]:
-    """Return the networks of seed 0 in the cells of learned tables that were trained on the set of this name."""
-    found = {path.parent.parent.name: load_module(path) for path in sorted(out.glob("*/*/seed0/model.ckpt"))}
+    """Return the networks of seed 0 in the cells of learned tables that were trained on the set of this name.
+
+    Only methods with a title count, so that an ablation's many settings of one method do not come along.
+    """
+    paths = {path.parent.parent.name: path for path in sorted(out.glob("*/*/seed0/model.ckpt"))}
+    found = {row: load_module(path) for row, path in paths.items() if row_title(row) != row}
     return {row_title(row): module for row, module in found.items() if module.hparams["training"]["set"] == name}
 
 

@@ -41,7 +41,8 @@ def test_a_trained_network_is_a_method_like_any_other(tmp_path):
 
 
 def test_networks_of_the_learned_tables_are_found_if_they_know_the_bodies(tmp_path):
-    for row, name in (("toys_mgcn", "toys_162"), ("toys_paper", "toys_162"), ("scape_add", "SCAPE_5000")):
+    rows = {"toys_mgcn": "toys_162", "toys_paper": "toys_162", "scape_mgcn": "SCAPE_5000", "ks_64": "toys_162"}
+    for row, name in rows.items():
         save(module_for(name), tmp_path / "out" / "cells" / row / "seed0" / "model.ckpt")
     save(module_for("toys_162"), tmp_path / "out" / "cells" / "toys_paper" / "seed1" / "model.ckpt")
     assert list(trained_on("toys_162", tmp_path / "out")) == ["MGCN", "CSMCNN"]
