@@ -115,8 +115,7 @@ def _sweep(name: str, rows: Sequence[dict[str, Any]], centre: ACD) -> Sweep:
     return Sweep(
         LABELS[name],
         [row["value"] for row in mine],
-        np.array([row["error"] for row in mine]),
-        np.array([row["standard error"] for row in mine]),
+        {"error": (np.array([row["error"] for row in mine]), np.array([row["standard error"] for row in mine]))},
         getattr(centre, name),
     )
 

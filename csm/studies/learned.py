@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -11,13 +11,16 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from csm._types import FloatArray
 from csm.evaluation.report import ResultRow
 from csm.evaluation.tables import error_cell
 from csm.studies.contenders import row_title
 from csm.studies.published import LEARNED_AGE
 from csm.studies.study import Findings
-from csm.viewer.comparisons import curve_panels, dots_figure
+from csm.viewer.comparisons import Sweep, curve_panels, dots_figure, sweeps_figure
 from csm.viewer.figures import Curve
+
+QUANTITY = "mean error (thousandths\nof the diameter)"
 
 _BY_CLASS = ", argmax"
 """What the name of a row ends in that was matched through the classifier."""
@@ -95,7 +98,7 @@ def _protocols(rows: Sequence[ResultRow]) -> list[str]:
     return found
 
 
-def dots(_: Path, rows: Sequence[ResultRow]) -> Figure:
+def dots(rows: Sequence[ResultRow]) -> Figure:
     """Return a picture of the mean errors, with a kind of dot per test set."""
     ages = {(row.method, row.test): 1000 * row.age for row in rows}
     methods, tests = (list(dict.fromkeys(key[i] for key in ages)) for i in (0, 1))
@@ -121,3 +124,30 @@ def _curve(folder: Path, row: ResultRow) -> Curve:
             tables.append(np.array([[float(cell) for cell in line] for line in list(csv.reader(opened))[1:]]))
     thresholds, fractions = np.mean(tables, axis=0).T
     return Curve(thresholds, fractions, row.age)
+
+
+def sweeps(rows: Sequence[ResultRow], varied: Mapping[str, Mapping[float | str, str]]) -> Figure:
+    """Return a picture of the mean errors over options that were changed one at a time, with a line per test set.
+
+    Parameters
+    ----------
+    rows
+        Of the matrix.
+    varied
+        Label of the option -> its values -> their rows, that of the preset first.  Values whose row is not among `rows`
+        are left out, and numbers drawn in ascending order.
+    """
+    found = {(row.method, row.test): row for row in rows}
+    methods, tests = ({key[i]: None for key in found} for i in (0, 1))
+    panels = []
+    for label, names in varied.items():
+        present = {value: name for value, name in names.items() if name in methods}
+        values = sorted(present, key=lambda value: (isinstance(value, str), 0.0 if isinstance(value, str) else value))
+        lines = {test: _line_over([found[present[value], test] for value in values]) for test in tests}
+        panels.append(Sweep(label, values, lines, next(iter(names))))
+    return sweeps_figure(panels, QUANTITY)
+
+
+def _line_over(rows: Sequence[ResultRow]) -> tuple[FloatArray, FloatArray]:
+    spread = [0.0 if row.age_std is None else row.age_std for row in rows]
+    return 1000 * np.array([row.age for row in rows]), 1000 * np.array(spread)

@@ -107,20 +107,18 @@ class Sweep:
     label
         Of the parameter.
     values
-        Shape (V,), ascending; drawn at equal distances, as a sweep chooses them.
-    means
-        Shape (V,).
-    spread
-        Shape (V,), half the length of the bars around the means, such as a standard error.
+        Numbers or names, V of them in the order drawn; at equal distances, as a sweep chooses them.
+    lines
+        Name -> means and half the lengths of the bars around them, such as standard errors; both of shape (V,).  The
+        sweeps of a figure have the same names.
     preset
         The value that the other sweeps hold this parameter at; marked if it is among the values.
     """
 
     label: str
-    values: Sequence[float]
-    means: FloatArray
-    spread: FloatArray
-    preset: float
+    values: Sequence[float | str]
+    lines: Mapping[str, tuple[FloatArray, FloatArray]]
+    preset: float | str
 
 
 def sweeps_figure(sweeps: Sequence[Sweep], quantity: str) -> Figure:
@@ -138,10 +136,13 @@ def sweeps_figure(sweeps: Sequence[Sweep], quantity: str) -> Figure:
     grid = figure.subplots(1, len(sweeps), sharey=True, squeeze=False)[0]
     for axes, sweep in zip(grid, sweeps, strict=True):
         place = np.arange(len(sweep.values))
-        axes.errorbar(place, sweep.means, sweep.spread, color=CYCLE[0], marker="o", markersize=4, capsize=2.5, lw=1.4)
-        chosen = np.flatnonzero(np.asarray(sweep.values) == sweep.preset)
-        axes.plot(place[chosen], sweep.means[chosen], "o", ms=9, mfc="none", mec=CYCLE[1], mew=1.6, label="preset")
-        axes.set_xticks(place, [f"{value:g}" for value in sweep.values])
+        chosen = [k for k, value in enumerate(sweep.values) if value == sweep.preset]
+        for k, (name, (means, spread)) in enumerate(sweep.lines.items()):
+            label = name if len(sweep.lines) > 1 else None
+            axes.errorbar(place, means, spread, color=CYCLE[k], marker="o", ms=4, capsize=2.5, lw=1.4, label=label)
+            ring = "preset" if k == len(sweep.lines) - 1 else None
+            axes.plot(place[chosen], means[chosen], "o", ms=9, mfc="none", mec="0.2", mew=1.4, label=ring)
+        axes.set_xticks(place, [value if isinstance(value, str) else f"{value:g}" for value in sweep.values])
         axes.set_xlabel(sweep.label, fontsize=9)
         axes.tick_params(labelsize=8)
         plain_axes(axes)

@@ -4,7 +4,7 @@ import pytest
 from hydra import compose, initialize_config_dir
 
 from csm.commands.app import config_folder
-from csm.commands.learned import LEARNED
+from csm.commands.learned import LEARNED, varied
 from csm.commands.matrix import chosen_rows
 from csm.studies.contenders import row_title
 from csm.studies.published import LEARNED_AGE
@@ -34,3 +34,16 @@ def test_the_figures_compare_what_their_captions_say():
     figure9, figure11 = (list(chosen_rows(experiment(name))) for name in ("figure9", "figure11"))
     assert [row_title(row) for row in figure9] == ["CSMCNN", "ACD + MGCN", "ACD + DiffusionNet"]
     assert [row_title(row) for row in figure11] == ["ACD alone", "ACD + MLP", "CSMCNN"]
+
+
+def test_an_ablation_varies_one_option_at_a_time():
+    with initialize_config_dir(str(config_folder()), version_base="1.3"):
+        found = varied(compose("matrix", ["experiment=ablation"]).rows)
+    assert {label: list(values) for label, values in found.items()} == {
+        "eigenpairs K_s": [128, 16, 32, 64, 256],
+        "terms": [6, 1, 2, 3, 12, 20],
+        "momentum": [0.1, 0.001, 0.01, 0.5],
+        "normalisation": ["batch", "instance", "none"],
+    }
+    assert {next(iter(values.values())) for values in found.values()} == {"ks_128_terms_6_momentum_0.1"}
+    assert found["terms"][12] == "terms_12"

@@ -2,10 +2,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from csm.evaluation.report import ResultRow
-from csm.studies.learned import curves, dots, findings
+from csm.studies.learned import curves, dots, findings, sweeps
 from tests.evaluation.test_report import row as result_row
 
 
@@ -74,9 +75,23 @@ def test_curves_are_means_over_seeds_with_a_panel_per_test_set(tmp_path, rows, m
 def test_dots_are_the_mean_errors_in_one_picture(tmp_path, rows, monkeypatch):
     drawn = []
     monkeypatch.setattr("csm.studies.learned.dots_figure", lambda *given: drawn.append(given))
-    dots(tmp_path, [rows[0], replace(rows[0], method="scape_paper", test="SCAPE_12500")])
+    dots([rows[0], replace(rows[0], method="scape_paper", test="SCAPE_12500")])
     ((names, panels),) = drawn
     assert names == ["MGCN", "CSMCNN"]
     (values,) = panels.values()
     assert values["SCAPE_5000"][0] == pytest.approx(20)
     assert values["SCAPE_12500"][0] != values["SCAPE_12500"][0]  # not measured
+
+
+def test_a_sweep_has_the_rows_that_are_there_in_the_order_of_their_values(rows):
+    ages = {"base": 0.02, "ks_64": 0.03, "ks_16": 0.05, "instance_norm": 0.04}
+    filled = [replace(rows[0], method=method, age=age, age_std=None) for method, age in ages.items()]
+    varied = {
+        "K_s": {128: "base", 64: "ks_64", 16: "ks_16", 256: "not trained"},
+        "normalisation": {"batch": "base", "instance": "instance_norm"},
+    }
+    first, second = sweeps(filled, varied).axes
+    assert [text.get_text() for text in first.get_xticklabels()] == ["16", "64", "128"]
+    np.testing.assert_allclose(first.get_lines()[0].get_ydata(), [50, 30, 20])
+    assert [text.get_text() for text in second.get_xticklabels()] == ["batch", "instance"]
+    assert list(second.get_lines()[-1].get_xdata()) == [0]

@@ -56,8 +56,8 @@ def test_curves_need_something_to_draw():
 
 def test_a_sweep_is_drawn_over_its_values_with_the_preset_marked():
     sweeps = [
-        Sweep("K", [5, 10, 100], np.array([3.0, 2.0, 1.0]), np.array([0.1, 0.2, 0.3]), 10),
-        Sweep("D", [1, 2], np.array([5.0, 6.0]), np.zeros(2), 6),
+        Sweep("K", [5, 10, 100], {"here": (np.array([3.0, 2.0, 1.0]), np.array([0.1, 0.2, 0.3]))}, 10),
+        Sweep("D", [1, "many"], {"here": (np.array([5.0, 6.0]), np.zeros(2))}, 6),
     ]
     first, second = sweeps_figure(sweeps, "error").axes
     np.testing.assert_array_equal(first.get_lines()[0].get_ydata(), [3, 2, 1])
@@ -65,6 +65,7 @@ def test_a_sweep_is_drawn_over_its_values_with_the_preset_marked():
     ring, nothing = (axes.get_lines()[-1] for axes in (first, second))
     assert (list(ring.get_xdata()), list(ring.get_ydata())) == ([1], [2.0])
     assert len(nothing.get_xdata()) == 0
+    assert [text.get_text() for text in second.get_xticklabels()] == ["1", "many"]
     assert first.get_ylabel() == "error"
     assert first.get_ylim() == second.get_ylim()
     assert first.get_ylim()[0] == 0
@@ -72,4 +73,13 @@ def test_a_sweep_is_drawn_over_its_values_with_the_preset_marked():
 
 def test_a_sweep_needs_values():
     with pytest.raises(ConfigError, match="at least one value"):
-        sweeps_figure([Sweep("K", [], np.zeros(0), np.zeros(0), 1)], "error")
+        sweeps_figure([Sweep("K", [], {"here": (np.zeros(0), np.zeros(0))}, 1)], "error")
+
+
+def test_a_sweep_has_a_line_per_condition_each_with_its_preset_marked():
+    none = np.zeros(2)
+    lines = {"fine": (np.array([3.0, 2.0]), none), "coarse": (np.array([4.0, 5.0]), none)}
+    (axes,) = sweeps_figure([Sweep("K", [5, 10], lines, 10)], "error").axes
+    rings = [line for line in axes.get_lines() if line.get_markersize() == 9]
+    assert [list(ring.get_ydata()) for ring in rings] == [[2.0], [5.0]]
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["preset", "fine", "coarse"]
