@@ -52,7 +52,7 @@ LEARNED: Mapping[str, LearnedStudy] = {
 }
 """The studies that train networks, by name."""
 
-_LABELS = {"model.ks": "eigenpairs K_s", "model.terms": "terms", "model.momentum": "momentum"}
+_LABELS = {"model.ks": "eigenpairs $K_s$", "model.terms": "terms", "model.momentum": "BatchNorm momentum"}
 
 
 def make(cfg: DictConfig, context: Context, name: str) -> Findings:

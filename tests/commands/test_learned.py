@@ -40,9 +40,9 @@ def test_an_ablation_varies_one_option_at_a_time():
     with initialize_config_dir(str(config_folder()), version_base="1.3"):
         found = varied(compose("matrix", ["experiment=ablation"]).rows)
     assert {label: list(values) for label, values in found.items()} == {
-        "eigenpairs K_s": [128, 16, 32, 64, 256],
+        "eigenpairs $K_s$": [128, 16, 32, 64, 256],
         "terms": [6, 1, 2, 3, 12, 20],
-        "momentum": [0.1, 0.001, 0.01, 0.5],
+        "BatchNorm momentum": [0.1, 0.001, 0.01, 0.5],
         "normalisation": ["batch", "instance", "none"],
     }
     assert {next(iter(values.values())) for values in found.values()} == {"ks_128_terms_6_momentum_0.1"}
