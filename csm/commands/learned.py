@@ -46,7 +46,7 @@ LEARNED: Mapping[str, LearnedStudy] = {
     "figure8": LearnedStudy("share of points within an error, the methods of table5", "table5", "scape", "curves"),
     "figure9": LearnedStudy("ACD fed to MGCN, DiffusionNet and CSMCNN", "figure9", "faust", "curves"),
     "figure11": LearnedStudy("ACD alone, with a perceptron and with CSMCNN", "figure11", "faust", "curves"),
-    "coarse": LearnedStudy("the methods of table4 with all their epochs, on 1000 vertices", "coarse", "coarse", "dots"),
+    "coarse": LearnedStudy("the methods of table4 on 1000 vertices, hardly cut short", "coarse", "coarse", "dots"),
     "humans_table": LearnedStudy("the methods of table4 on the built-in humans", "humans_table", "humans", "dots"),
     "ablation": LearnedStudy("K_s, terms and normalisation of CSMCNN", "ablation", "ablation", "sweeps"),
 }

@@ -19,7 +19,7 @@ from csm.operators.geodesic import Method
 from csm.studies.bodies import label
 from csm.studies.couples import PERSONS, averaged, training_errors, training_shapes
 from csm.studies.published import AGE, family
-from csm.studies.study import Context, Findings
+from csm.studies.study import MEAN_ERROR, Context, Findings
 from csm.viewer.comparisons import dots_figure
 from csm.viewer.figures import save_figure
 
@@ -110,7 +110,7 @@ def run(
     rows = [_row(name, title, errors[descriptor]) for (name, title), descriptor in wanted.items()]
     names = [f"{label(name)}: {title}" if title != AS_IN_TABLE else label(name) for name, title in wanted]
     path = context.out / "assumptions.png"
-    save_figure(path, dots_figure(names, {_QUANTITY: {"": [row["error"] for row in rows]}}))
+    save_figure(path, dots_figure(names, {MEAN_ERROR: {"": [row["error"] for row in rows]}}))
     notes = (
         f"error: mean over {n_pairs} ordered pairs of {points} points each, in thousandths of the target's geodesic "
         f"diameter ({distance} distances); two poses of one of the first {PERSONS} persons, both ways; no test shape.",
@@ -120,7 +120,6 @@ def run(
     return Findings("assumptions", title, ("descriptor", "variant", "paper", *_NUMBERS), rows, notes, (path,))
 
 
-_QUANTITY = "mean error (thousandths of the diameter)"
 _NUMBERS = ("error", "standard error")
 
 

@@ -14,7 +14,7 @@ from csm.operators.geodesic import Method
 from csm.studies.bodies import Bodies, Source, find_bodies
 from csm.studies.contestants import contestants
 from csm.studies.damage import Plan, by_method, damage_rows
-from csm.studies.study import Context, Findings
+from csm.studies.study import MEAN_ERROR, Context, Findings
 from csm.viewer.figures import save_figure
 from csm.viewer.style import line_style, new_figure
 
@@ -78,6 +78,6 @@ def _draw(rows: Sequence[Mapping[str, Any]], methods: Sequence[str]) -> Figure:
         axes.plot(strengths, errors, marker="o", markersize=4, label=method, **line_style(k))
     axes.set_ylim(bottom=0)
     axes.set_xlabel("noise (mean edge lengths)")
-    axes.set_ylabel("mean error (thousandths of the diameter)")
+    axes.set_ylabel(MEAN_ERROR)
     figure.legend(loc="outside right center", frameon=False)
     return figure

@@ -14,7 +14,7 @@ from csm.operators.geodesic import Method
 from csm.studies.bodies import Bodies, Source, find_bodies
 from csm.studies.contestants import contestants
 from csm.studies.damage import Damage, Plan, by_method, damage_rows
-from csm.studies.study import Context, Findings
+from csm.studies.study import MEAN_ERROR, Context, Findings
 from csm.viewer.comparisons import dots_figure
 from csm.viewer.figures import save_figure
 
@@ -61,13 +61,13 @@ def run(
     damages |= {f"{100 * f:g} % cut away": partial(cut_extremity, fraction=float(f)) for f in fractions}
     damages["grown together"] = grown_together
     rows = damage_rows(context, bodies, damages, methods, Plan(n_pairs, points, distance))
-    label, path = "mean error (thousandths of the diameter)", context.out / "figure13.png"
+    path = context.out / "figure13.png"
     errors = {(row["method"], row["damage"]): row["error"] for row in rows}
     drawn = {
         damage: [float("nan") if (error := errors[method, damage]) is None else error for method in methods]
         for damage in damages
     }
-    save_figure(path, dots_figure(list(methods), {label: drawn}))
+    save_figure(path, dots_figure(list(methods), {MEAN_ERROR: drawn}))
     title = f"Matching onto damaged shapes ({bodies.title}), errors in thousandths of the diameter."
     notes = (
         f"{n_pairs} ordered pairs of the last twenty bodies, {points} points left on the target each, distance "

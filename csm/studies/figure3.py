@@ -27,11 +27,10 @@ from csm.descriptors.presets import preset
 from csm.errors import ConfigError
 from csm.operators.geodesic import Method
 from csm.studies.couples import PERSONS, averaged, training_errors, training_shapes
-from csm.studies.study import Context, Findings
+from csm.studies.study import MEAN_ERROR, Context, Findings
 from csm.viewer.comparisons import Sweep, sweeps_figure
 from csm.viewer.figures import save_figure
 
-QUANTITY = "mean error (thousandths\nof the diameter)"
 LABELS = {"alpha": "strength α", "angles": "angles J", "k": "eigenpairs K", "order": "order D"}
 
 
@@ -86,7 +85,7 @@ def run(
         for value, setting in zip(sorted(values), wanted[name], strict=True)
     ]
     path = context.out / "figure3.png"
-    save_figure(path, sweeps_figure([_sweep(name, rows, centre) for name in sweeps], QUANTITY))
+    save_figure(path, sweeps_figure([_sweep(name, rows, centre) for name in sweeps], MEAN_ERROR))
     title = f"Error of nearest-neighbour matching by ACD over its parameters, others as in {base} ({shapes.name})."
     shown = ("parameter", "value", "columns", "error", "standard error")
     return Findings("figure3", title, shown, rows, _notes(n_pairs, points, distance), (path,))

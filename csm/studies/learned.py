@@ -16,11 +16,9 @@ from csm.evaluation.report import ResultRow
 from csm.evaluation.tables import error_cell
 from csm.studies.contenders import row_title
 from csm.studies.published import LEARNED_AGE
-from csm.studies.study import Findings
+from csm.studies.study import MEAN_ERROR, Findings
 from csm.viewer.comparisons import Sweep, curve_panels, dots_figure, sweeps_figure
 from csm.viewer.figures import Curve
-
-QUANTITY = "mean error (thousandths\nof the diameter)"
 
 _BY_CLASS = ", argmax"
 """What the name of a row ends in that was matched through the classifier."""
@@ -104,7 +102,7 @@ def dots(rows: Sequence[ResultRow]) -> Figure:
     methods, tests = (list(dict.fromkeys(key[i] for key in ages)) for i in (0, 1))
     values = {test: [ages.get((method, test), float("nan")) for method in methods] for test in tests}
     names = [row_title(method) for method in methods]
-    return dots_figure(names, {"mean error (thousandths of the diameter)": values})
+    return dots_figure(names, {MEAN_ERROR: values})
 
 
 def curves(folder: Path, rows: Sequence[ResultRow]) -> Figure:
@@ -135,17 +133,17 @@ def sweeps(rows: Sequence[ResultRow], varied: Mapping[str, Mapping[float | str, 
         Of the matrix.
     varied
         Label of the option -> its values -> their rows, that of the preset first.  Values whose row is not among `rows`
-        are left out, and numbers drawn in ascending order.
+        are left out, as are options without any; numbers are drawn in ascending order.
     """
     found = {(row.method, row.test): row for row in rows}
     methods, tests = ({key[i]: None for key in found} for i in (0, 1))
     panels = []
     for label, names in varied.items():
         present = {value: name for value, name in names.items() if name in methods}
-        values = sorted(present, key=lambda value: (isinstance(value, str), 0.0 if isinstance(value, str) else value))
+        values = sorted(present, key=lambda value: 0.0 if isinstance(value, str) else value)
         lines = {test: _line_over([found[present[value], test] for value in values]) for test in tests}
-        panels.append(Sweep(label, values, lines, next(iter(names))))
-    return sweeps_figure(panels, QUANTITY)
+        panels += [Sweep(label, values, lines, next(iter(names)))] if values else []
+    return sweeps_figure(panels, MEAN_ERROR)
 
 
 def _line_over(rows: Sequence[ResultRow]) -> tuple[FloatArray, FloatArray]:

@@ -14,6 +14,9 @@ from csm.data.store import Store
 from csm.evaluation.provenance import Provenance
 from csm.mesh.io import atomic_path
 
+MEAN_ERROR = "mean error (thousandths of the diameter)"
+"""The label of the axis that most figures share."""
+
 
 @dataclass(frozen=True, eq=False)
 class Context:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -16,6 +17,7 @@ from csm.viewer.figures import Curve
 from csm.viewer.style import CYCLE, line_style, plain_axes
 
 _LEGEND_COLUMNS = 4
+_LABEL_WIDTH = 24  # letters that the height of a panel has room for
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 
@@ -147,6 +149,6 @@ def sweeps_figure(sweeps: Sequence[Sweep], quantity: str) -> Figure:
         axes.tick_params(labelsize=8)
         plain_axes(axes)
     grid[0].set_ylim(bottom=0)
-    grid[0].set_ylabel(quantity, fontsize=9)
+    grid[0].set_ylabel(textwrap.fill(quantity, _LABEL_WIDTH), fontsize=9)
     grid[-1].legend(frameon=False, fontsize=8)
     return figure

@@ -95,3 +95,6 @@ def test_a_sweep_has_the_rows_that_are_there_in_the_order_of_their_values(rows):
     np.testing.assert_allclose(first.get_lines()[0].get_ydata(), [50, 30, 20])
     assert [text.get_text() for text in second.get_xticklabels()] == ["batch", "instance"]
     assert list(second.get_lines()[-1].get_xdata()) == [0]
+    assert first.get_ylabel() == "mean error (thousandths\nof the diameter)"
+    (only,) = sweeps(filled[1:3], varied).axes
+    assert [text.get_text() for text in only.get_xticklabels()] == ["16", "64"]
