@@ -10,7 +10,7 @@ import torch
 
 from csm.mesh.shape import Mesh
 from csm.networks import Basis, Surface
-from csm.operators.bundle import Operators
+from csm.operators.operators import Operators
 from csm.operators.stencils import stencil
 
 

@@ -14,7 +14,7 @@ from csm.data.inspection import Inspected, inspect
 from csm.data.kinds import Kind
 from csm.data.prepare import Job, Recipe, Summary, prepare
 from csm.data.store import Store
-from csm.descriptors.chebyshev import ACD
+from csm.descriptors.acd import ACD
 from csm.errors import CsmError, DataError
 from csm.mesh.io import copy_file, unpacked
 

@@ -18,7 +18,7 @@ from csm.descriptors.base import Descriptor, record
 from csm.errors import CsmError
 from csm.mesh.check import require_usable
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Operators
+from csm.operators.operators import Operators
 from csm.operators.spectrum import Spectrum
 from csm.operators.stencils import Stencil
 

@@ -6,24 +6,24 @@ Examples
 ('theta=0.000 T0', 'theta=0.000 T1')
 """
 
+from csm.descriptors.acd import ACD
 from csm.descriptors.add import ADD
 from csm.descriptors.amks import AMKS
 from csm.descriptors.asmwd import ASMWD
 from csm.descriptors.awft import AWFT
 from csm.descriptors.base import Descriptor, Features
-from csm.descriptors.chebyshev import ACD
 from csm.descriptors.constant import Constant
 from csm.descriptors.coordinates import Coordinates
 from csm.descriptors.dep import DEP
 from csm.descriptors.gps import GPS
-from csm.descriptors.heat import HKS
+from csm.descriptors.hks import HKS
 from csm.descriptors.presets import PRESETS, from_parameters, preset
 from csm.descriptors.shot import SHOT
 from csm.descriptors.smwd import SMWD
 from csm.descriptors.stack import Stack
-from csm.descriptors.wave import WKS
 from csm.descriptors.weds import WEDS
 from csm.descriptors.wft import WFT
+from csm.descriptors.wks import WKS
 
 __all__ = [
     "ACD",

@@ -9,10 +9,10 @@ import numpy as np
 
 from csm._types import FloatArray
 from csm.descriptors.base import Features, as_operators
-from csm.descriptors.wave import WaveBand
+from csm.descriptors.wks import WaveBand
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Operators
+from csm.operators.operators import Operators
 
 LengthUnit: TypeAlias = Literal["original", "unit_area"]
 

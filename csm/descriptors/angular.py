@@ -6,8 +6,8 @@ import numpy as np
 
 from csm._types import FloatArray
 from csm.errors import ConfigError
-from csm.operators.bundle import Operators
 from csm.operators.frames import FrameKind
+from csm.operators.operators import Operators
 from csm.operators.spectrum import Spectrum
 
 

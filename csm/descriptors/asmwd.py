@@ -8,14 +8,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from csm._types import FloatArray
+from csm.descriptors.acd import unit_rows
 from csm.descriptors.angular import ByAngle
 from csm.descriptors.base import Features, as_operators
-from csm.descriptors.chebyshev import unit_rows
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Operators
 from csm.operators.filters import filter_names, meyer_filters, unit_sums
 from csm.operators.frames import FrameKind
+from csm.operators.operators import Operators
 from csm.operators.spectrum import Spectrum
 
 

@@ -11,8 +11,8 @@ from csm.descriptors.base import Features, as_operators
 from csm.descriptors.windowed import ColumnNorm, require_known, surface_functions, unit_columns, windowed_energies
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Operators
 from csm.operators.frames import FrameKind
+from csm.operators.operators import Operators
 from csm.operators.spectrum import Spectrum
 
 

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from csm.descriptors.base import Features, as_operators
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Operators
+from csm.operators.operators import Operators
 
 
 @dataclass(frozen=True)

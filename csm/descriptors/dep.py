@@ -13,8 +13,8 @@ from csm._types import Float32Array, FloatArray
 from csm.descriptors.base import Features, as_operators
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Operators
 from csm.operators.geodesic import geodesics
+from csm.operators.operators import Operators
 
 EvolutionDistance: TypeAlias = Literal["edge", "heat", "biharmonic"]
 

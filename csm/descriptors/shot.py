@@ -11,11 +11,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from csm._types import FloatArray, IntArray
+from csm.descriptors.acd import unit_rows
 from csm.descriptors.base import Features, as_operators
-from csm.descriptors.chebyshev import unit_rows
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Operators
+from csm.operators.operators import Operators
 
 SECTORS = 8
 """Azimuth sectors; with two elevations and two radii they make 32 volumes."""

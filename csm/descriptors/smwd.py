@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Literal, TypeAlias, get_args
 
+from csm.descriptors.acd import unit_rows
 from csm.descriptors.asmwd import meyer_block
 from csm.descriptors.base import Features, as_operators
-from csm.descriptors.chebyshev import unit_rows
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Operators
 from csm.operators.filters import filter_names, mexican_hat_filters
+from csm.operators.operators import Operators
 
 WaveletVariant: TypeAlias = Literal["meyer", "mexican"]
 

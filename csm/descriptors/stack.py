@@ -11,7 +11,7 @@ import numpy as np
 from csm.descriptors.base import Descriptor, Features, as_operators, eigenpairs, record
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Operators
+from csm.operators.operators import Operators
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from csm._types import Float32Array, FloatArray, IntArray
 from csm.descriptors.base import Features, as_operators
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Operators
 from csm.operators.filters import filter_names, mexican_hat_filters
+from csm.operators.operators import Operators
 
 _BLOCK = 256  # columns of the N x N wavelets that are held at a time
 _NEGLIGIBLE = 1e-9  # of a filter's greatest value: float32 would not feel it, but denormal numbers are slow

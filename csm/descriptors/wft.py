@@ -9,7 +9,7 @@ from csm.descriptors.base import Features, as_operators
 from csm.descriptors.windowed import ColumnNorm, require_known, surface_functions, unit_columns, windowed_energies
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Operators
+from csm.operators.operators import Operators
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,12 @@ import numpy as np
 
 from csm._types import FloatArray
 from csm.descriptors.geovec import geometry_vectors
-from csm.descriptors.heat import heat_kernel_signature, heat_times
-from csm.descriptors.wave import WaveBand, wave_band, wave_kernel_signature
+from csm.descriptors.hks import heat_kernel_signature, heat_times
+from csm.descriptors.wks import WaveBand, wave_band, wave_kernel_signature
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Operators
 from csm.operators.frames import edge_tensors, smooth
+from csm.operators.operators import Operators
 from csm.operators.spectrum import Spectrum
 
 ColumnNorm: TypeAlias = Literal["vertices", "area"]

@@ -11,8 +11,8 @@ from csm._types import BoolArray, FloatArray, IntArray
 from csm.evaluation.metrics import FLIP_MARGIN, flipped
 from csm.evaluation.remembered import RememberedGeodesics
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Memo
 from csm.operators.geodesic import Geodesics, Method, geodesics
+from csm.operators.operators import Memo
 
 KEPT_POINTS = 500
 """Rows of so many points are kept at most: at 15,000 vertices 30 MB per shape."""

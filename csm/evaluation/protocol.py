@@ -24,8 +24,8 @@ from csm.evaluation.distances import MatchedPoints, TargetErrors, target_errors
 from csm.evaluation.metrics import FLIP_MARGIN
 from csm.evaluation.results import Evaluation, PairErrors, summarise
 from csm.mesh.correspondence import ground_truth
-from csm.operators.bundle import Memo
 from csm.operators.geodesic import Method
+from csm.operators.operators import Memo
 
 Normaliser: TypeAlias = Literal["diameter", "sqrt_area"]
 Pair: TypeAlias = tuple[str, str]

@@ -6,8 +6,8 @@ import numpy as np
 
 from csm._types import FloatArray, IntArray
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Memo
 from csm.operators.geodesic import Geodesics
+from csm.operators.operators import Memo
 
 FAR = 0.2
 """Pairs farther apart than this, in units of sqrt(area) and as the crow flies, ask for a row.

@@ -34,7 +34,7 @@ class ChebyNet(nn.Module):
     terms
         Number K of Chebyshev polynomials per convolution, T_0 .. T_{K-1}.
     laplacian
-        "graph" or "cotangent", see `csm.operators.scaledlaplacian.ScaledLaplacian`.
+        "graph" or "cotangent", see `csm.operators.stencils.scaled_laplacian.ScaledLaplacian`.
     dropout
         Between descriptor and classifier.
 

@@ -109,7 +109,7 @@ class DiffusionNet(nn.Module):
     descriptor_channels
         Width of the learned descriptor; None for that of the blocks, without a layer in between, as published.
     regularisation
-        Of the gradients, see `csm.operators.gradients.VertexGradients`.
+        Of the gradients, see `csm.operators.stencils.gradients.VertexGradients`.
     block_dropout
         Inside the perceptron of every block.
     dropout

@@ -31,7 +31,7 @@ class MGCN(nn.Module):
     filters
         Size of the bank of filters; every second one, without the low-pass, is a wavelet.
     tolerance
-        What the sparse wavelets may lose of their sum, see `csm.operators.wavelets.Wavelets`; 0 is exact.
+        What the sparse wavelets may lose of their sum, see `csm.operators.stencils.wavelets.Wavelets`; 0 is exact.
     products
         Precision of the sums over vertices, see `WaveletOperators`.
     dropout

@@ -32,7 +32,7 @@ class Patch(NamedTuple):
 
 
 class WaveletOperators:
-    """The operators G_1 .. G_S of one shape, patch by patch (see `csm.operators.wavelets.Wavelets`).
+    """The operators G_1 .. G_S of one shape, patch by patch (see `csm.operators.stencils.wavelets.Wavelets`).
 
     Parameters
     ----------

@@ -135,7 +135,7 @@ class SplineConv(nn.Module):
 
 
 def spline_messages(x: Tensor, weight: Tensor, stencil: Mapping[str, Tensor]) -> Tensor:
-    """Return sum_m S_m x W_m, shape (N, C_out), for the matrices S_m of `csm.operators.edgesplines.EdgeSplines`.
+    """Return sum_m S_m x W_m, shape (N, C_out), for the matrices S_m of `csm.operators.stencils.edge_splines.EdgeSplines`.
 
     One control point is gathered, multiplied and scattered at a time, so nothing is larger than the functions
     themselves.  The transpose of S_m is the matrix of the mirrored control point m'.  So with V_m = S_m dy, the

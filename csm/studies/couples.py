@@ -23,8 +23,8 @@ from csm.evaluation.distances import MatchedPoints, target_errors
 from csm.evaluation.matching import nearest
 from csm.mesh.correspondence import ground_truth
 from csm.mesh.io import atomic_path
-from csm.operators.bundle import Operators
 from csm.operators.geodesic import Method
+from csm.operators.operators import Operators
 from csm.studies.study import Context
 
 PERSONS, POSES = 8, 10

@@ -13,7 +13,7 @@ from csm.data.store import Store
 from csm.descriptors.base import Descriptor, eigenpairs
 from csm.errors import CsmError
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Operators
+from csm.operators.operators import Operators
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import numpy as np
 from csm._types import FloatArray
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Operators
+from csm.operators.operators import Operators
 from csm.studies.bodies import Bodies, Source, find_bodies
 from csm.studies.study import Context, Findings
 from csm.viewer.figures import save_figure

@@ -22,7 +22,7 @@ import numpy as np
 
 from csm._types import FloatArray
 from csm.data.shapeset import ShapeSet
-from csm.descriptors.chebyshev import ACD
+from csm.descriptors.acd import ACD
 from csm.descriptors.presets import preset
 from csm.errors import ConfigError
 from csm.operators.geodesic import Method

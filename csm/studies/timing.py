@@ -15,7 +15,7 @@ from csm._types import FloatArray, IntArray
 from csm.descriptors.presets import from_parameters
 from csm.mesh.remesh import refine
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Operators
+from csm.operators.operators import Operators
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import pytest
 from csm.data.humans import load_humans, mirror
 from csm.errors import DataError
 from csm.mesh.check import check
-from csm.mesh.edits import edge_table
+from csm.mesh.remesh.edge_moves import edge_table
 
 HUMANS = load_humans()
 

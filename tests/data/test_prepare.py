@@ -15,8 +15,8 @@ from csm.data.store import Store, read_entry
 from csm.descriptors import ACD
 from csm.mesh.io import write_mesh
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Operators
-from csm.operators.wavelets import Wavelets
+from csm.operators.operators import Operators
+from csm.operators.stencils.wavelets import Wavelets
 from tests.toyset import write_toys
 
 RECIPE = Recipe(ACD(angles=3, k=5, order=2), 10)

@@ -7,7 +7,7 @@ import torch
 from csm.networks import ChebyNet, Surface
 from csm.networks.chebynet import ChebConv, laplacian_of
 from csm.operators.laplacian import stiffness
-from csm.operators.scaledlaplacian import graph_laplacian
+from csm.operators.stencils.scaled_laplacian import graph_laplacian
 from tests.shapes import blob
 from tests.surfaces import surface_of
 

@@ -6,7 +6,7 @@ import torch
 
 from csm.networks import Basis, CSMConv
 from csm.networks.csmconv import chebyshev
-from csm.operators.bundle import Operators
+from csm.operators.operators import Operators
 from tests.shapes import blob
 
 

@@ -6,7 +6,7 @@ import torch
 from csm.networks import SplineCNN, Surface
 from csm.networks.splinecnn import SplineConv, spline_messages
 from csm.operators import Operators
-from csm.operators.edgesplines import directed_edges, pseudo_coordinates
+from csm.operators.stencils.edge_splines import directed_edges, pseudo_coordinates
 from tests.shapes import blob, plane
 from tests.surfaces import surface_of
 

@@ -10,8 +10,8 @@ import scipy.linalg
 from csm.errors import ConfigError, MeshError, NumericalError
 from csm.mesh.shape import Mesh
 from csm.operators import _eigensolver as solver
-from csm.operators.bundle import Operators
 from csm.operators.laplacian import stiffness, vertex_areas
+from csm.operators.operators import Operators
 from csm.operators.spectrum import Spectrum, eigenpairs
 from tests.shapes import blob, plane, sphere, torus
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from csm.errors import ConfigError
-from csm.operators.bundle import Operators
+from csm.operators.operators import Operators
 from csm.studies import figure2
 from tests.studies.toys import toy_bodies, toy_context
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from csm.descriptors.chebyshev import ACD
+from csm.descriptors.acd import ACD
 from csm.errors import ConfigError
 from csm.studies import couples, figure3
 from tests.studies.toys import Toys, toy_context

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from csm.data.shapeset import Shape
-from csm.descriptors.chebyshev import ACD
+from csm.descriptors.acd import ACD
 from csm.mesh.correspondence import PointMap
 from csm.studies import figure5
 from csm.viewer.grid import Panel

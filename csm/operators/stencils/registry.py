@@ -9,12 +9,12 @@ from __future__ import annotations
 from typing import Any, ClassVar, Protocol
 
 from csm._types import Arrays
-from csm.operators.anisotropic import AnisotropicLaplacians
-from csm.operators.bundle import Operators
-from csm.operators.edgesplines import EdgeSplines
-from csm.operators.gradients import VertexGradients
-from csm.operators.scaledlaplacian import ScaledLaplacian
-from csm.operators.wavelets import Wavelets
+from csm.operators.operators import Operators
+from csm.operators.stencils.anisotropic_laplacians import AnisotropicLaplacians
+from csm.operators.stencils.edge_splines import EdgeSplines
+from csm.operators.stencils.gradients import VertexGradients
+from csm.operators.stencils.scaled_laplacian import ScaledLaplacian
+from csm.operators.stencils.wavelets import Wavelets
 
 
 class Stencil(Protocol):

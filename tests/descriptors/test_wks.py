@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from csm.descriptors import WKS
-from csm.descriptors.wave import wave_band
+from csm.descriptors.wks import wave_band
 from csm.errors import ConfigError
 from csm.operators import Operators
 from tests.shapes import blob

@@ -11,8 +11,8 @@ from scipy.sparse.linalg import eigsh
 
 from csm._types import Arrays, FloatArray
 from csm.errors import ConfigError
-from csm.operators.bundle import Operators
 from csm.operators.frames import FrameKind
+from csm.operators.operators import Operators
 
 _DENSE_BELOW = 100  # rows
 _TOLERANCE = 1e-8  # of the largest eigenvalue

@@ -11,7 +11,7 @@ from csm._types import Arrays, FloatArray, IntArray
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.operators._edges import dot, unit
-from csm.operators.bundle import Operators
+from csm.operators.operators import Operators
 
 _LONGEST = 1e-6  # edges at a vertex within this fraction of the longest are equally long
 

@@ -12,8 +12,8 @@ from csm.descriptors.angular import ByAngle
 from csm.descriptors.base import Features, as_operators
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Operators
 from csm.operators.frames import FrameKind
+from csm.operators.operators import Operators
 from csm.operators.spectrum import Spectrum
 
 

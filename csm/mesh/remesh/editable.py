@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from csm._types import BoolArray, FloatArray, IntArray
-from csm.mesh import edits
-from csm.mesh.edits import EdgeTable
+from csm.mesh.remesh import edge_moves
+from csm.mesh.remesh.edge_moves import EdgeTable
 from csm.mesh.shape import Mesh
 from csm.mesh.surface import Surface, SurfacePoints, nearest_on_triangles
 
@@ -50,7 +50,7 @@ class Draft:
 
     def table(self) -> EdgeTable:
         """Return the edges as they are now."""
-        return edits.edge_table(self.faces)
+        return edge_moves.edge_table(self.faces)
 
     def wanted(self) -> FloatArray:
         """Wanted edge length at each vertex, shape (n,)."""
@@ -66,14 +66,14 @@ class Draft:
         """Split up to `count` independent edges, longest first, that exceed a relative length; returns how many."""
         table = self.table()
         ratio = self.relative_lengths(table) * self.rng.uniform(0.97, 1.03, len(table.ends))
-        chosen = edits.independent(
+        chosen = edge_moves.independent(
             table, np.flatnonzero(ratio > longer_than), ratio[ratio > longer_than], len(self.faces)
         )
         chosen = chosen[:count]
         t = self.rng.uniform(0.4, 0.6, (len(chosen), 1))
         points = (1 - t) * self.vertices[table.ends[chosen, 0]] + t * self.vertices[table.ends[chosen, 1]]
         place = self.surface.walk(points, self.place.faces[table.ends[chosen, 0]])
-        self.faces = edits.split(self.faces, table, chosen, self.n)
+        self.faces = edge_moves.split(self.faces, table, chosen, self.n)
         self.place = SurfacePoints(
             np.concatenate([self.place.faces, place.faces]), np.concatenate([self.place.barycentric, place.barycentric])
         )
@@ -88,8 +88,8 @@ class Draft:
             candidates = np.flatnonzero(table.inner)
             gain = self._flip_gain(table, candidates)
             candidates, gain = candidates[gain > 1e-3], gain[gain > 1e-3]
-            chosen = edits.independent(table, candidates, gain, len(self.faces))
-            after = edits.flip(self.faces, table, chosen)
+            chosen = edge_moves.independent(table, candidates, gain, len(self.faces))
+            after = edge_moves.flip(self.faces, table, chosen)
             if (after == self.faces).all():
                 break
             self.faces = after
@@ -114,21 +114,21 @@ class Draft:
         table = self.table()
         ratio = self.relative_lengths(table)
         edges = np.flatnonzero(ratio < shorter_than)
-        edges = edges[edits.collapsible(table, edges, self.n)]
+        edges = edges[edge_moves.collapsible(table, edges, self.n)]
         gone, kept = self._directions(table, edges)
         fine = (gone >= self.n_fixed) & ~(self.stuck(table)[gone])
         edges, gone, kept = edges[fine], gone[fine], kept[fine]
         fine = self._collapse_is_fine(gone, kept, careful)
         edges, gone, kept = edges[fine], gone[fine], kept[fine]
-        chosen = edits.independent_collapses(table, gone, kept, -ratio[edges], self.n)
+        chosen = edge_moves.independent_collapses(table, gone, kept, -ratio[edges], self.n)
         chosen = chosen[np.argsort(ratio[edges[chosen]], kind="stable")][:count]
-        self.faces = edits.collapse(self.faces, gone[chosen], kept[chosen])
+        self.faces = edge_moves.collapse(self.faces, gone[chosen], kept[chosen])
         self._drop(gone[chosen])
         return len(chosen)
 
     def _directions(self, table: EdgeTable, edges: IntArray) -> tuple[IntArray, IntArray]:
         """Choose which end vanishes: never a corner, or a boundary vertex into the inside; otherwise at random."""
-        rank = 2 * self.stuck(table).astype(int) + edits.boundary_vertices(table, self.n)
+        rank = 2 * self.stuck(table).astype(int) + edge_moves.boundary_vertices(table, self.n)
         i, j = table.ends[edges].T
         i_goes = rank[i] * 2 + self.rng.integers(0, 2, len(edges)) < rank[j] * 2 + 1
         return np.where(i_goes, i, j), np.where(i_goes, j, i)
@@ -143,7 +143,7 @@ class Draft:
         incoming, outgoing = total.copy(), total
         incoming[forward[:, 1]], outgoing[forward[:, 0]] = step, step
         turns: BoolArray = (incoming * outgoing).sum(axis=1) < CORNER
-        return edits.boundary_vertices(table, self.n) & turns
+        return edge_moves.boundary_vertices(table, self.n) & turns
 
     def _collapse_is_fine(self, gone: IntArray, kept: IntArray, careful: bool) -> BoolArray:
         """Whether moving `gone[k]` onto `kept[k]` turns no face too far, and is careful, shape (K,)."""
@@ -198,7 +198,7 @@ class Draft:
 
         Moves that turn a face, or that end on the other side of a thin part, are undone.
         """
-        free = ~edits.boundary_vertices(self.table(), self.n)
+        free = ~edge_moves.boundary_vertices(self.table(), self.n)
         free[: self.n_fixed] = False
         moved = np.flatnonzero(free)
         place = self.surface.walk(self.vertices[moved] + offset[moved], self.place.faces[moved])

@@ -10,7 +10,7 @@ from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.operators import Operators
 from csm.operators.laplacian import stiffness
-from csm.operators.scaledlaplacian import ScaledLaplacian, graph_laplacian
+from csm.operators.stencils.scaled_laplacian import ScaledLaplacian, graph_laplacian
 from tests.shapes import blob, cylinder, plane, sphere
 
 SHAPES = [sphere(2), cylinder(n=9, m=8), plane(8), blob(2)]

@@ -16,8 +16,8 @@ from csm._types import FloatArray
 from csm.errors import MeshError
 from csm.mesh.check import check
 from csm.mesh.correspondence import Direction, PointMap
-from csm.mesh.draft import LONG, Draft
-from csm.mesh.edits import adjacency, edge_table
+from csm.mesh.remesh.edge_moves import adjacency, edge_table
+from csm.mesh.remesh.editable import LONG, Draft
 from csm.mesh.shape import Mesh
 from csm.mesh.surface import Surface, SurfacePoints
 

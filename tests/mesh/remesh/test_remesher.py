@@ -10,8 +10,8 @@ import trimesh
 
 from csm.errors import MeshError
 from csm.mesh.check import check
-from csm.mesh.edits import edge_table
 from csm.mesh.remesh import Remeshed, refine, remesh
+from csm.mesh.remesh.edge_moves import edge_table
 from csm.mesh.shape import Mesh
 from csm.mesh.surface import nearest_on_triangles
 from tests.shapes import blob, cylinder, plane, sphere, torus

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from csm.mesh import edits
-from csm.mesh.edits import EdgeTable, edge_table
+from csm.mesh.remesh import edge_moves
+from csm.mesh.remesh.edge_moves import EdgeTable, edge_table
 from tests.shapes import blob, plane
 
 SQUARE = np.array([[0, 1, 2], [0, 2, 3]])
@@ -34,7 +34,7 @@ def test_edge_table_of_a_square() -> None:
     assert table.faces[diagonal].tolist() == [1, 0]  # face 1 runs 0 -> 2, face 0 runs 2 -> 0
     assert table.opposite[diagonal].tolist() == [3, 1]
     assert table.inner.sum() == 1
-    assert edits.boundary_vertices(table, 4).all()
+    assert edge_moves.boundary_vertices(table, 4).all()
     np.testing.assert_array_equal(
         np.sort(table.ends[table.of_faces(2)].reshape(2, -1)), [[0, 0, 1, 1, 2, 2], [0, 0, 2, 2, 3, 3]]
     )
@@ -51,17 +51,17 @@ def test_edge_table_agrees_with_trimesh() -> None:
 
 
 def test_flip_turns_the_diagonal_and_a_second_flip_turns_it_back() -> None:
-    once = edits.flip(SQUARE, edge_table(SQUARE), row_of(edge_table(SQUARE), 0, 2))
+    once = edge_moves.flip(SQUARE, edge_table(SQUARE), row_of(edge_table(SQUARE), 0, 2))
     assert row_of(edge_table(once), 1, 3).size == 1
     assert row_of(edge_table(once), 0, 2).size == 0
-    twice = edits.flip(once, edge_table(once), row_of(edge_table(once), 1, 3))
+    twice = edge_moves.flip(once, edge_table(once), row_of(edge_table(once), 1, 3))
     np.testing.assert_array_equal(edge_table(twice).ends, edge_table(SQUARE).ends)
 
 
 def test_a_flip_never_doubles_an_edge() -> None:
     tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
     table = edge_table(tetrahedron)
-    np.testing.assert_array_equal(edits.flip(tetrahedron, table, np.array([0])), tetrahedron)
+    np.testing.assert_array_equal(edge_moves.flip(tetrahedron, table, np.array([0])), tetrahedron)
 
 
 @pytest.mark.parametrize("make", [lambda: blob(2), plane])
@@ -71,23 +71,23 @@ def test_many_independent_splits_flips_and_collapses_keep_the_topology(make) -> 
     faces, n, chi = mesh.faces, mesh.n_vertices, euler(mesh.faces)
     for _ in range(6):
         table = edge_table(faces)
-        chosen = edits.independent(table, np.arange(len(table.ends)), rng.random(len(table.ends)), len(faces))
+        chosen = edge_moves.independent(table, np.arange(len(table.ends)), rng.random(len(table.ends)), len(faces))
         assert np.bincount(table.faces[chosen][table.faces[chosen] >= 0]).max() == 1
-        faces, n = edits.split(faces, table, chosen, n), n + len(chosen)
+        faces, n = edge_moves.split(faces, table, chosen, n), n + len(chosen)
         assert is_sound(faces, n)
         table = edge_table(faces)
         inner = np.flatnonzero(table.inner)
-        faces = edits.flip(faces, table, edits.independent(table, inner, rng.random(len(inner)), len(faces)))
+        faces = edge_moves.flip(faces, table, edge_moves.independent(table, inner, rng.random(len(inner)), len(faces)))
         assert is_sound(faces, n)
         table = edge_table(faces)
-        edges = np.flatnonzero(edits.collapsible(table, np.arange(len(table.ends)), n))
-        rim = edits.boundary_vertices(table, n)[table.ends[edges]]
+        edges = np.flatnonzero(edge_moves.collapsible(table, np.arange(len(table.ends)), n))
+        rim = edge_moves.boundary_vertices(table, n)[table.ends[edges]]
         side = np.where(rim[:, 0], 1, 0) * np.where(rim.all(axis=1), 0, 1)  # a boundary vertex stays
         gone, kept = np.take_along_axis(table.ends[edges], np.column_stack([side, 1 - side]), axis=1).T
-        chosen = edits.independent_collapses(table, gone, kept, rng.random(len(gone)), n)
+        chosen = edge_moves.independent_collapses(table, gone, kept, rng.random(len(gone)), n)
         assert len(chosen) > len(np.unique(faces)) / 40
         before = len(np.unique(faces))
-        faces = edits.collapse(faces, gone[chosen], kept[chosen])
+        faces = edge_moves.collapse(faces, gone[chosen], kept[chosen])
         assert len(np.unique(faces)) == before - len(chosen)
         assert is_sound(faces, n)
         assert euler(faces) == chi
@@ -102,5 +102,5 @@ def test_the_link_condition_refuses_what_would_pinch_the_surface() -> None:
     faces = np.concatenate([faces, faces[:, :] + 3])  # two storeys, open at both ends
     table = edge_table(faces)
     middle = row_of(table, 3, 4)
-    assert not edits.collapsible(table, middle, 9)[0]
-    assert not edits.collapsible(edge_table(SQUARE), row_of(edge_table(SQUARE), 0, 2), 4)[0]
+    assert not edge_moves.collapsible(table, middle, 9)[0]
+    assert not edge_moves.collapsible(edge_table(SQUARE), row_of(edge_table(SQUARE), 0, 2), 4)[0]

@@ -7,9 +7,9 @@ import pytest
 
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Operators
 from csm.operators.filters import mexican_hat_filters
-from csm.operators.wavelets import Wavelets, partition, substantial
+from csm.operators.operators import Operators
+from csm.operators.stencils.wavelets import Wavelets, partition, substantial
 from tests.shapes import blob
 
 

@@ -12,9 +12,9 @@ from scipy.sparse.linalg import eigsh
 from csm._types import Arrays
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Operators
-from csm.operators.edgesplines import directed_edges
 from csm.operators.laplacian import stiffness
+from csm.operators.operators import Operators
+from csm.operators.stencils.edge_splines import directed_edges
 
 LaplacianKind: TypeAlias = Literal["graph", "cotangent"]
 

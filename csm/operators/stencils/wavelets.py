@@ -10,8 +10,8 @@ from scipy import sparse
 
 from csm._types import Arrays, BoolArray, Float32Array, FloatArray, IntArray
 from csm.errors import ConfigError
-from csm.operators.bundle import Operators
 from csm.operators.filters import mexican_hat_filters
+from csm.operators.operators import Operators
 
 _NEGLIGIBLE = 1e-9  # of a filter's greatest value: float32 would not feel it, but denormal numbers are slow
 _GRAIN = 128  # that counts of vertices are rounded up to: matrix kernels are generated once for every size that occurs

@@ -9,8 +9,8 @@ from scipy import sparse
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.operators import Operators
-from csm.operators.anisotropic import AnisotropicLaplacians, scaled
 from csm.operators.laplacian import stiffness
+from csm.operators.stencils.anisotropic_laplacians import AnisotropicLaplacians, scaled
 from tests.shapes import blob, rotation, sphere
 
 

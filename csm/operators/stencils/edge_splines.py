@@ -11,7 +11,7 @@ import numpy as np
 from csm._types import Arrays, FloatArray, IntArray
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Operators
+from csm.operators.operators import Operators
 
 
 class DirectedEdges(NamedTuple):

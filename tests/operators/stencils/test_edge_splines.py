@@ -8,7 +8,7 @@ import pytest
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.operators import Operators
-from csm.operators.edgesplines import EdgeSplines, directed_edges, linear_splines, pseudo_coordinates
+from csm.operators.stencils.edge_splines import EdgeSplines, directed_edges, linear_splines, pseudo_coordinates
 from tests.shapes import blob, cylinder, plane, rotation, sphere
 
 SHAPES = [sphere(1), cylinder(n=8, m=5), plane(6), blob(2)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from csm.mesh.draft import LONG, Draft
+from csm.mesh.remesh.editable import LONG, Draft
 from csm.mesh.shape import Mesh
 from tests.shapes import blob, plane, sphere
 

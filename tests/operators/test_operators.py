@@ -9,7 +9,7 @@ import pytest
 from csm.errors import MeshError
 from csm.mesh.shape import Mesh
 from csm.operators import Operators
-from csm.operators import bundle as module
+from csm.operators import operators as operators_module as module
 from tests.shapes import blob, sphere
 
 

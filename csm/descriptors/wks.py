@@ -12,7 +12,7 @@ from csm._types import FloatArray
 from csm.descriptors.base import Features, as_operators
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
-from csm.operators.bundle import Operators
+from csm.operators.operators import Operators
 
 WaveVariant: TypeAlias = Literal["aubry", "functional_map"]
 

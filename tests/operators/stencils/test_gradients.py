@@ -9,7 +9,7 @@ from scipy import sparse
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.operators import Operators
-from csm.operators.gradients import VertexGradients
+from csm.operators.stencils.gradients import VertexGradients
 from tests.shapes import blob, plane, rotation, sphere
 
 
