@@ -1,10 +1,15 @@
 """Descriptors: call one on a `Mesh` and get a row of numbers per vertex.
 
+Every family that `csm.descriptors.presets` registers is here under the name of its class; those named below are known
+to type checkers as well.
+
 Examples
 --------
 >>> preset("acd_paper", angles=8).columns[:2]
 ('theta=0.000 T0', 'theta=0.000 T1')
 """
+
+from typing import TYPE_CHECKING
 
 from csm.descriptors.acd import ACD
 from csm.descriptors.add import ADD
@@ -17,7 +22,7 @@ from csm.descriptors.coordinates import Coordinates
 from csm.descriptors.dep import DEP
 from csm.descriptors.gps import GPS
 from csm.descriptors.hks import HKS
-from csm.descriptors.presets import PRESETS, from_parameters, preset
+from csm.descriptors.presets import FAMILIES, PRESETS, from_parameters, preset
 from csm.descriptors.shot import SHOT
 from csm.descriptors.smwd import SMWD
 from csm.descriptors.stack import Stack
@@ -32,6 +37,7 @@ __all__ = [
     "ASMWD",
     "AWFT",
     "DEP",
+    "FAMILIES",
     "GPS",
     "HKS",
     "PRESETS",
@@ -48,3 +54,11 @@ __all__ = [
     "from_parameters",
     "preset",
 ]
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> type[Descriptor]:
+        for family in FAMILIES.values():
+            if family.__name__ == name:
+                return family
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -56,31 +57,36 @@ class ACD(ByAngle):
 
     Notes
     -----
-    The defaults are the text of the paper (140 columns); `release` is the published code (48 columns).  Block j of a
-    mirror image is block -j mod J of the original.  Faces must be oriented outwards: inside out, convex and concave
-    change places as well, and the block of theta is the original's of pi/2 - theta.
+    The defaults are csm's own settings (640 columns): smooth frames, sums to 11, 10, 9 and 8 eigenpairs, T_0 .. T_7
+    damped, centred.  They were chosen by nearest-neighbour matching of FAUST shapes 0 to 79 and of TOSCA's cats, dogs
+    and wolves.  `paper` has the settings of the text of the paper (140 columns), `release` those of its published code
+    (48 columns).
+
+    Block j of a mirror image is block -j mod J of the original.  Faces must be oriented outwards: inside out, convex
+    and concave change places as well, and the block of theta is the original's of pi/2 - theta.
 
     Examples
     --------
-    >>> len(ACD().columns), len(ACD.release().columns)
-    (140, 48)
-    >>> ACD().columns[10]
-    'theta=0.157 T3'
+    >>> len(ACD().columns), len(ACD.paper().columns), len(ACD.release().columns)
+    (640, 140, 48)
+    >>> ACD().columns[10], ACD.paper().columns[10]
+    ('theta=0.000 K=10 T2', 'theta=0.157 T3')
     """
 
     alpha: float = 10.0
     angles: int = 20
-    k: int = 10
-    order: int = 6
+    k: int = 11
+    order: int = 7
     normalise: bool = False
-    frame: FrameKind = "line_field"
+    frame: FrameKind = "smooth"
     sweeps: int = 3
     smoothing: float = 0.08
-    centred: bool = False
-    cuts: int = 1
-    damping: float = 0.0
+    centred: bool = True
+    cuts: int = 4
+    damping: float = 0.5
 
     name: ClassVar[str] = "acd"
+    added: ClassVar[Mapping[str, Any]] = {"damping": 0.0}
 
     def __post_init__(self) -> None:
         if self.angles < 1 or self.order < 0 or not self.alpha >= 0:
@@ -88,21 +94,23 @@ class ACD(ByAngle):
         if not self.damping >= 0:
             raise ConfigError(f"{self}: wanted damping >= 0")
         if self.cuts < 1 or self.k - self.cuts < 1:
-            raise ConfigError(f"{self}: wanted cuts >= 1, and k >= 2 eigenpairs in the last of them")
+            raise ConfigError(f"{self}: wanted cuts >= 1 and k > cuts, so that the last cut still has 2 eigenpairs")
         self._require_different_angles()
 
     @classmethod
-    def own(cls) -> ACD:
-        """Return csm's own settings: smooth frames, sums to 11, 10, 9 and 8 eigenpairs, T_0 .. T_7 damped, centred.
+    def paper(cls) -> ACD:
+        """Return the settings of the paper's text: sums to 10 eigenpairs, T_0 .. T_6, neither damped nor centred."""
+        return cls(k=10, order=6, frame="line_field", centred=False, cuts=1, damping=0.0)
 
-        Chosen by nearest-neighbour matching of FAUST shapes 0 to 79 and of TOSCA's cats, dogs and wolves.
-        """
-        return cls(k=11, order=7, frame="smooth", centred=True, cuts=4, damping=0.5)
+    @classmethod
+    def isotropic(cls) -> ACD:
+        """Return the settings of the paper for the isotropic Laplacian: what ACD is without its angles."""
+        return replace(cls.paper(), alpha=0.0, angles=1)
 
     @classmethod
     def release(cls, *, frame: FrameKind = "line_field", sweeps: int = 3) -> ACD:
         """Return the settings of the authors' code; with ``frame="released", sweeps=10`` also its frame."""
-        return cls(alpha=4.0, angles=8, k=70, order=5, normalise=True, frame=frame, sweeps=sweeps)
+        return replace(cls.paper(), alpha=4.0, angles=8, k=70, order=5, normalise=True, frame=frame, sweeps=sweeps)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -125,10 +133,6 @@ class ACD(ByAngle):
         if self.centred:
             values -= operators.mass @ values / operators.mass.sum()
         return Features(unit_rows(values) if self.normalise else values, self.columns)
-
-    def parameters(self) -> dict[str, Any]:
-        """Return every parameter as plain data; without a damping of 0, so that what older keys name stays valid."""
-        return {key: value for key, value in asdict(self).items() if key != "damping" or value}
 
 
 def chebyshev_block(spectrum: Spectrum, order: int) -> FloatArray:

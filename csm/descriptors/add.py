@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from csm.operators.spectrum import Spectrum
 
 @dataclass(frozen=True)
 class ADD(ByAngle):
-    r"""Geometry vectors of the anisotropic spectrum, one block of columns per angle: what ADD learns filters on.
+    r"""Geometry vectors of the anisotropic spectrum, one block of columns per angle: the input of ADD's filters.
 
     For the angle theta_j = pi j / J, the eigenpairs of B(alpha, theta_j) and cubic B-splines B_i over [0, lambda_K],
 
@@ -33,7 +33,7 @@ class ADD(ByAngle):
     ----------
     alpha
         Strength, at least 0.  At 0 every angle has the same Laplacian, so `angles` must then be 1.  A guess: the code
-        of ADD was not to be had; 100 is what its authors' later code for ACNN runs.
+        of ADD was not available; 100 is what its authors' later code for ACNN runs.
     angles
         J, spread evenly over [0, pi) with the end left out.  A guess: 16 is from the same code.
     k
@@ -98,10 +98,6 @@ class ADD(ByAngle):
         operators = as_operators(shape)
         values = np.hstack([self._block(self._spectrum(operators, theta)) for theta in self.thetas])
         return Features(unit_rows(values) if self.normalise else values, self.columns)
-
-    def parameters(self) -> dict[str, Any]:
-        """Return every parameter as plain data."""
-        return asdict(self)
 
     def _block(self, spectrum: Spectrum) -> FloatArray:
         greatest = float(spectrum.evals[spectrum.n_zero() :].max())

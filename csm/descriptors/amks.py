@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar, Literal, TypeAlias, get_args
+from dataclasses import dataclass
+from typing import ClassVar, Literal, TypeAlias, get_args
 
 import numpy as np
 
 from csm._types import FloatArray
-from csm.descriptors.base import Features, as_operators
+from csm.descriptors.base import Descriptor, Features, as_operators
 from csm.descriptors.wks import WaveBand
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
@@ -18,7 +18,7 @@ LengthUnit: TypeAlias = Literal["original", "unit_area"]
 
 
 @dataclass(frozen=True)
-class AMKS:
+class AMKS(Descriptor):
     r"""Chance that a quantum particle of log-energy e, put at a point, is found there again, averaged over a time T.
 
     .. math::
@@ -84,10 +84,6 @@ class AMKS:
         band = energy_band(evals[spectrum.n_zero()], evals[-1], self.n_energies, self.variance)
         values = average_mixing_kernel_signature(evals, spectrum.evecs**2 * square, band, self.time)
         return Features(values, tuple(f"e={e:.3f}" for e in band.energies))
-
-    def parameters(self) -> dict[str, Any]:
-        """Return every parameter as plain data."""
-        return asdict(self)
 
 
 def energy_band(first: float, last: float, n: int, variance: float) -> WaveBand:

@@ -1,18 +1,19 @@
-"""What the descriptors share that have one block of columns per angle of the anisotropic Laplacian."""
+"""Descriptors with one block of columns per angle of the anisotropic Laplacian."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from csm._types import FloatArray
+from csm.descriptors.base import Descriptor
 from csm.errors import ConfigError
 from csm.operators.frames import FrameKind
 from csm.operators.operators import Operators
 from csm.operators.spectrum import Spectrum
 
 
-class ByAngle:
-    """Angles and spectra of a descriptor with these parameters, which its dataclass has as fields."""
+class ByAngle(Descriptor):
+    """A descriptor with one block of columns per angle; the parameters below are fields of each family."""
 
     alpha: float
     angles: int

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -90,10 +90,6 @@ class ASMWD(ByAngle):
         operators = as_operators(shape)
         values = np.hstack([meyer_block(self._spectrum(operators, theta), self.n_filters) for theta in self.thetas])
         return Features(unit_rows(values) if self.normalise else values, self.columns)
-
-    def parameters(self) -> dict[str, Any]:
-        """Return every parameter as plain data."""
-        return asdict(self)
 
 
 def meyer_block(spectrum: Spectrum, n_filters: int) -> FloatArray:

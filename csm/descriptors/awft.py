@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar, NamedTuple
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from csm.descriptors.base import Features, as_operators
+from csm.descriptors.base import Descriptor, Features, as_operators
 from csm.descriptors.windowed import ColumnNorm, require_known, surface_functions, unit_columns, windowed_energies
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
@@ -22,7 +22,7 @@ class _Laplacian(NamedTuple):
 
 
 @dataclass(frozen=True)
-class AWFT:
+class AWFT(Descriptor):
     """Energy of functions on the surface in anisotropic heat windows around every point.
 
     The energy is `csm.descriptors.windowed.windowed_energies`, with the isotropic Laplacian and with the anisotropic
@@ -119,10 +119,6 @@ class AWFT:
         }
         values = np.stack([energies[which] for which in self._laplacians()], axis=2)
         return Features(unit_columns(values.reshape(len(values), -1), operators.mass, self.normalise), self.columns)
-
-    def parameters(self) -> dict[str, Any]:
-        """Return every parameter as plain data."""
-        return asdict(self)
 
     def _laplacians(self) -> list[_Laplacian]:
         """Return the Laplacian of every block of columns; equal ones are equal here."""

@@ -1,11 +1,20 @@
-"""What every descriptor is: a small frozen dataclass of parameters that is called on a shape."""
+"""The base class of all descriptors, and what calling one returns.
+
+A descriptor is a frozen dataclass: its fields are its parameters, and calling it on a mesh returns `Features`.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from csm._types import FloatArray
+from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.operators.operators import Operators
 
@@ -13,6 +22,8 @@ from csm.operators.operators import Operators
 @dataclass(frozen=True, eq=False)
 class Features:
     """A descriptor evaluated at every vertex.
+
+    ``numpy.asarray(features)`` is `values`, so features can be given to functions of arrays.
 
     Attributes
     ----------
@@ -25,36 +36,95 @@ class Features:
     values: FloatArray
     columns: tuple[str, ...]
 
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of vertices N and of columns Q."""
+        n, q = self.values.shape
+        return n, q
 
-@runtime_checkable
-class Descriptor(Protocol):
-    """A map from a shape to one row of numbers per vertex."""
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        if copy is False and dtype is not None and np.dtype(dtype) != self.values.dtype:
+            raise ValueError(f"features of type {self.values.dtype} become {np.dtype(dtype)} only as a copy")
+        return np.array(self.values, dtype=dtype) if copy else np.asarray(self.values, dtype=dtype)
+
+    def __repr__(self) -> str:
+        n, q = self.shape
+        ends = self.columns[:1] + self.columns[1:][-1:]
+        return f"Features({n} vertices, {q} columns: {' ... '.join(ends)})"
+
+
+@dataclass(frozen=True)
+class Descriptor(ABC):
+    """A map from a shape to one row of numbers per vertex: the base class of every family of descriptors.
+
+    A family is a frozen dataclass that derives from this class.  It has its parameters as fields, a `name`, and a
+    method ``__call__``.
+
+    Attributes
+    ----------
+    name
+        What stored results and checkpoints call the family.
+    version
+        Raised by one when a change of the formula gives other values for the same parameters.
+    added
+        Parameters that came after the first release, each with the value at which it changes nothing: at that value
+        it is left out of `parameters()`, so keys of stored results and checkpoints written before stay valid.
+    """
 
     name: ClassVar[str]
+    version: ClassVar[int] = 1
+    added: ClassVar[Mapping[str, Any]] = {}
 
+    @property
+    def eigenpairs(self) -> int:
+        """Greatest number of eigenpairs asked of one operator; 0 if none are.
+
+        It is the parameter `k` if there is one, unless a family says otherwise.  Of several descriptors of one shape
+        evaluate the one that asks for most first: `Operators` reuses its spectrum for the others.
+        """
+        return int(getattr(self, "k", 0))
+
+    @abstractmethod
     def __call__(self, shape: Mesh | Operators) -> Features:
-        """Evaluate on a mesh (which is first scaled to unit area) or on operators made before (used as they are)."""
-        ...
+        """Evaluate on a mesh, which is first scaled to unit area, or on operators made before, used as they are."""
 
     def parameters(self) -> dict[str, Any]:
-        """Return every parameter as plain data: with `name`, all that a cache key needs."""
-        ...
+        """Return the parameters as plain data, without those of `added` that have their neutral value."""
+        return {key: x for key, x in asdict(self).items() if key not in self.added or x != self.added[key]}
 
 
 def record(descriptor: Descriptor) -> dict[str, Any]:
-    """Return family and parameters as plain data, which `csm.descriptors.from_parameters` takes back."""
-    return {"name": descriptor.name, **descriptor.parameters()}
+    """Return name, parameters and, from the second on, version: what keys and checkpoints know a descriptor by.
 
-
-def eigenpairs(descriptor: Descriptor) -> int:
-    """Return the greatest number of eigenpairs that a descriptor asks an operator for; 0 if it asks for none.
-
-    It is the descriptor's `eigenpairs` if it has such a property, else its parameter `k`.  Of several descriptors of
-    one shape the one that asks for most goes first, because a larger spectrum serves the smaller wishes.
+    `csm.descriptors.from_parameters` makes the descriptor of a record.
     """
-    return int(getattr(descriptor, "eigenpairs", getattr(descriptor, "k", 0)))
+    found = {"name": descriptor.name, **descriptor.parameters()}
+    return found if descriptor.version == 1 else {**found, "version": descriptor.version}
 
 
 def as_operators(shape: Mesh | Operators) -> Operators:
-    """Return `shape` itself if it is `Operators`, else the operators of the mesh at unit area."""
-    return Operators(shape) if isinstance(shape, Mesh) else shape
+    """Return `shape` itself if it is `Operators`, else the operators of the mesh at unit area.
+
+    Raises
+    ------
+    ConfigError
+        If it is neither.
+    """
+    if isinstance(shape, Operators):
+        return shape
+    if isinstance(shape, Mesh):
+        return Operators(shape)
+    raise ConfigError(
+        f"a descriptor was called on {_named(shape)}; it wants a mesh, as csm.read_mesh(path) returns it, or Operators"
+    )
+
+
+def _named(thing: object) -> str:
+    """Return a phrase for what is no shape."""
+    kind = type(thing).__name__
+    if isinstance(thing, np.ndarray):
+        return f"an array of shape {thing.shape}"
+    return f"the {kind} {str(thing)!r}" if isinstance(thing, str) or hasattr(thing, "__fspath__") else f"a {kind}"

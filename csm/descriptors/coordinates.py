@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
-from csm.descriptors.base import Features, as_operators
+from csm.descriptors.base import Descriptor, Features, as_operators
 from csm.mesh.shape import Mesh
 from csm.operators.operators import Operators
 
 
 @dataclass(frozen=True)
-class Coordinates:
-    """Where a vertex is, seen from the centre of the surface: an input for networks.
+class Coordinates(Descriptor):
+    """Coordinates of every vertex relative to the centre of the surface: an input for networks.
 
     Not unchanged by rotations and not a descriptor to match by: shapes must stand upright and look the same way, or
     the network must have seen them turned.
@@ -29,7 +29,3 @@ class Coordinates:
         operators = as_operators(shape)
         vertices, areas = operators.mesh.vertices, operators.mass
         return Features(vertices - areas @ vertices / areas.sum(), ("x", "y", "z"))
-
-    def parameters(self) -> dict[str, Any]:
-        """Return every parameter as plain data; there is none."""
-        return asdict(self)

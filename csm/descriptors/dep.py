@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import combinations_with_replacement
-from typing import Any, ClassVar, Literal, NamedTuple, TypeAlias, get_args
+from typing import ClassVar, Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 
 from csm._types import Float32Array, FloatArray
-from csm.descriptors.base import Features, as_operators
+from csm.descriptors.base import Descriptor, Features, as_operators
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.operators.geodesic import geodesics
@@ -23,8 +23,8 @@ _BLOCK = 512
 
 
 @dataclass(frozen=True)
-class DEP:
-    r"""What gathers at a point when a constant function evolves, step by discounted step, within a distance delta.
+class DEP(Descriptor):
+    r"""Sum of the discounted steps in which a constant function evolves within a distance delta of every point.
 
     With distances d scaled to a greatest of 1, vertex areas Omega and the process  E = K Omega  of
 
@@ -99,19 +99,20 @@ class DEP:
         """Number of steps after which the rest of the series is below `tolerance`."""
         return max(1, int(np.ceil(np.log(self.tolerance * (1 - self.c)) / np.log(self.c))))
 
+    @property
+    def eigenpairs(self) -> int:
+        """K for the biharmonic distance; the others use no eigenpairs."""
+        return self.k if self.distance == "biharmonic" else 0
+
     def __call__(self, shape: Mesh | Operators) -> Features:
         """Return the descriptor of every vertex, (N, n_scales), without unit."""
         operators = as_operators(shape)
         kernel = closeness(self._rows(operators), operators.mesh.n_vertices)
         columns = []
-        for delta in self.scales[::-1]:  # descending, so that what is cut stays cut and one matrix serves all
+        for delta in self.scales[::-1]:  # descending: entries once set to zero stay zero, so one matrix is enough
             cut_beyond(kernel, delta)
             columns.append(unit_range(evolution(kernel, operators.mass, self.c, self.terms)))
         return Features(np.stack(columns[::-1], axis=1), tuple(f"delta={delta:.3f}" for delta in self.scales))
-
-    def parameters(self) -> dict[str, Any]:
-        """Return every parameter as plain data."""
-        return asdict(self)
 
     def _rows(self, operators: Operators) -> Iterator[FloatArray]:
         """Yield the rows of the distance matrix, some at a time."""

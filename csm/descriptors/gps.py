@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from csm.descriptors.base import Features, as_operators
+from csm.descriptors.base import Descriptor, Features, as_operators
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.operators.operators import Operators
 
 
 @dataclass(frozen=True)
-class GPS:
+class GPS(Descriptor):
     r"""Eigenfunctions that are not constant, each over the square root of its eigenvalue.
 
     .. math:: g_k(x) = \frac{|\phi_k(x)|}{\sqrt{\lambda_k}}, \qquad k = 2 \ldots K + 1.
@@ -68,7 +68,3 @@ class GPS:
         values = spectrum.evecs[:, zeros:] / np.sqrt(spectrum.evals[zeros:])
         names = tuple(f"phi_{k}" for k in range(2, self.k + 2))
         return Features(np.abs(values) if self.absolute else values, names)
-
-    def parameters(self) -> dict[str, Any]:
-        """Return every parameter as plain data."""
-        return asdict(self)

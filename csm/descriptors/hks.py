@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
 from csm._types import FloatArray
-from csm.descriptors.base import Features, as_operators
+from csm.descriptors.base import Descriptor, Features, as_operators
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.operators.operators import Operators
 
 
 @dataclass(frozen=True)
-class HKS:
+class HKS(Descriptor):
     r"""Heat left at a point after a time t, for logarithmically spaced times.
 
     .. math:: h_t(x) = \sum_{k=1}^{K} e^{-\lambda_k t} \, \phi_k(x)^2
@@ -52,6 +53,7 @@ class HKS:
     last: float | None = None
 
     name: ClassVar[str] = "hks"
+    added: ClassVar[Mapping[str, Any]] = {"first": None, "last": None}
 
     def __post_init__(self) -> None:
         if self.k < 2 or self.n_times < 2:
@@ -77,10 +79,6 @@ class HKS:
             heat_kernel_signature(spectrum.evals, spectrum.evecs, times, scaled=self.scaled),
             tuple(f"t={t:.3g}" for t in times),
         )
-
-    def parameters(self) -> dict[str, Any]:
-        """Return every parameter as plain data; times that are not given are left out."""
-        return {key: value for key, value in asdict(self).items() if value is not None}
 
 
 def heat_times(first: float, last: float, n: int) -> FloatArray:

@@ -1,60 +1,71 @@
-"""Descriptors by name, as experiments and the command line ask for them."""
+"""The registry: every named setting of every descriptor, one line each.
+
+A new family needs a file with its class in this folder, and one line here.  `from_parameters` then knows it by its
+`name`, and `csm.descriptors` has the class, so that a configuration can name it as ``csm.descriptors.NAME``.
+"""
 
 from __future__ import annotations
 
 from dataclasses import fields, replace
 from typing import Any
 
-from csm.descriptors.acd import ACD
-from csm.descriptors.add import ADD
-from csm.descriptors.amks import AMKS
-from csm.descriptors.asmwd import ASMWD
-from csm.descriptors.awft import AWFT
+from csm._places import load
 from csm.descriptors.base import Descriptor
-from csm.descriptors.constant import Constant
-from csm.descriptors.coordinates import Coordinates
-from csm.descriptors.dep import DEP
-from csm.descriptors.gps import GPS
-from csm.descriptors.hks import HKS
-from csm.descriptors.shot import SHOT
-from csm.descriptors.smwd import SMWD
 from csm.descriptors.stack import Stack
-from csm.descriptors.weds import WEDS
-from csm.descriptors.wft import WFT
-from csm.descriptors.wks import WKS
 from csm.errors import ConfigError
 
-PRESETS: dict[str, Descriptor] = {
-    "acd": ACD.own(),
-    "acd_paper": ACD(),
-    "acd_release": ACD.release(),
-    "acd_release_frame": ACD.release(frame="released", sweeps=10),
-    "acd_isotropic": ACD(alpha=0.0, angles=1),
-    "hks": HKS(),
-    "hks_diffusionnet": HKS(k=128, n_times=16, scaled=False, first=0.01, last=1.0),
-    "wks": WKS(),
-    "wks_functional_map": WKS(variant="functional_map"),
-    "shot": SHOT(),
-    "dep": DEP(),
-    "amks": AMKS(),
-    "smwd": SMWD(),
-    "smwd_mexican": SMWD(variant="mexican"),
-    "weds": WEDS(),
-    "wft": WFT(),
-    "awft": AWFT(),
-    "asmwd": ASMWD(),
-    "add": ADD(),
-    "gps": GPS(),
-    "constant": Constant(),
-    "xyz": Coordinates(),
+SETTINGS: dict[str, tuple[str, dict[str, Any]]] = {
+    "acd": ("acd:ACD", {}),
+    "acd_paper": ("acd:ACD.paper", {}),
+    "acd_release": ("acd:ACD.release", {}),
+    "acd_release_frame": ("acd:ACD.release", {"frame": "released", "sweeps": 10}),
+    "acd_isotropic": ("acd:ACD.isotropic", {}),
+    "hks": ("hks:HKS", {}),
+    "hks_diffusionnet": ("hks:HKS", {"k": 128, "n_times": 16, "scaled": False, "first": 0.01, "last": 1.0}),
+    "wks": ("wks:WKS", {}),
+    "wks_functional_map": ("wks:WKS", {"variant": "functional_map"}),
+    "shot": ("shot:SHOT", {}),
+    "dep": ("dep:DEP", {}),
+    "amks": ("amks:AMKS", {}),
+    "smwd": ("smwd:SMWD", {}),
+    "smwd_mexican": ("smwd:SMWD", {"variant": "mexican"}),
+    "weds": ("weds:WEDS", {}),
+    "wft": ("wft:WFT", {}),
+    "awft": ("awft:AWFT", {}),
+    "asmwd": ("asmwd:ASMWD", {}),
+    "add": ("add:ADD", {}),
+    "gps": ("gps:GPS", {}),
+    "constant": ("constant:Constant", {}),
+    "xyz": ("coordinates:Coordinates", {}),
 }
-"""Named settings; "acd_release_frame" reproduces the authors' output with their frame, world axes and all."""
+"""Name -> file and class (or what else makes the descriptor), and the parameters that differ from its defaults.
 
-_FAMILIES: dict[str, Any] = {descriptor.name: type(descriptor) for descriptor in PRESETS.values()}
+"acd_release_frame" reproduces the authors' output with their frame, which depends on the world's axes.
+"""
+
+PRESETS: dict[str, Descriptor] = {
+    name: load(f"csm.descriptors.{place}")(**changes) for name, (place, changes) in SETTINGS.items()
+}
+"""The named settings as descriptors."""
+
+FAMILIES: dict[str, type[Descriptor]] = {each.name: type(each) for each in PRESETS.values()} | {Stack.name: Stack}
+"""The classes of descriptors by `Descriptor.name`."""
 
 
 def preset(name: str, **overrides: Any) -> Descriptor:
-    """Return the descriptor called `name`, with some parameters replaced.
+    """Return the descriptor with a named setting, with some parameters replaced.
+
+    Parameters
+    ----------
+    name
+        A key of `PRESETS`, such as "acd" (csm's own settings), "acd_paper", "hks", "wks" or "shot".
+    **overrides
+        Parameters of the descriptor that shall have other values than in the setting.
+
+    Returns
+    -------
+    Descriptor
+        Call it on a `Mesh` to get `Features`: one row of numbers per vertex.
 
     Raises
     ------
@@ -65,37 +76,61 @@ def preset(name: str, **overrides: Any) -> Descriptor:
     --------
     >>> preset("hks", n_times=16)
     HKS(k=300, n_times=16, scaled=True, first=None, last=None)
+
+    >>> import csm
+    >>> preset("acd")(csm.read_mesh("tr_reg_000.off"))  # doctest: +SKIP
+    Features(6890 vertices, 640 columns: theta=0.000 K=11 T0 ... theta=2.985 K=8 T7)
     """
     if name not in PRESETS:
         raise ConfigError(f"there is no descriptor {name!r}; there are {', '.join(PRESETS)}")
-    descriptor: Any = PRESETS[name]
+    descriptor = PRESETS[name]
     known = [field.name for field in fields(descriptor)]
     unknown = [key for key in overrides if key not in known]
     if unknown:
         raise ConfigError(f"{name} has no parameter {', '.join(unknown)}; it has {', '.join(known)}")
-    changed: Descriptor = replace(descriptor, **overrides)
-    return changed
+    return replace(descriptor, **overrides)
 
 
-def from_parameters(name: str, **parameters: Any) -> Descriptor:
-    """Return the descriptor of a family with all its parameters, as a checkpoint or the store records it.
+def from_parameters(name: str, *, version: int = 1, **parameters: Any) -> Descriptor:
+    """Return the descriptor of a record, as `csm.descriptors.base.record` makes it for checkpoints and the store.
+
+    Parameters
+    ----------
+    name
+        Of the family.
+    version
+        Of the family's formula, when the record was made.
+    **parameters
+        All parameters of the family; those of `Descriptor.added` may be missing and then have their neutral value.
 
     Raises
     ------
     ConfigError
-        If the family or a parameter is unknown, or a value is out of range.
+        If the family or a parameter is unknown, a parameter is missing, a value is out of range, or the formula has
+        another version by now.
 
     Examples
     --------
-    >>> from_parameters("hks", **HKS(n_times=16).parameters()) == HKS(n_times=16)
+    >>> from_parameters("hks", **preset("hks", n_times=16).parameters()) == preset("hks", n_times=16)
     True
     """
-    if name == Stack.name:
-        return Stack({key: from_parameters(**part) for key, part in parameters["parts"].items()})
-    if name not in _FAMILIES:
-        raise ConfigError(f"there is no descriptor family {name!r}; there are {', '.join(_FAMILIES)}")
-    try:
-        descriptor: Descriptor = _FAMILIES[name](**parameters)
-    except TypeError as error:
-        raise ConfigError(f"descriptor {name}: {error}") from error
-    return descriptor
+    if name not in FAMILIES:
+        raise ConfigError(f"there is no descriptor family {name!r}; there are {', '.join(FAMILIES)}")
+    family = FAMILIES[name]
+    if version != family.version:
+        raise ConfigError(
+            f"descriptor {name}: the record is of version {version}, but this csm computes version {family.version}; "
+            "prepare or train anew, or use the csm that the record was made with"
+        )
+    given = {**family.added, **parameters}
+    known = [field.name for field in fields(family)]
+    unknown, missing = [key for key in given if key not in known], [key for key in known if key not in given]
+    if unknown or missing:
+        raise ConfigError(
+            f"descriptor {name}: the record has {', '.join(given) or 'no parameters'}, but wanted are "
+            f"{', '.join(known) or 'none'} (unknown: {', '.join(unknown) or 'none'}; "
+            f"missing: {', '.join(missing) or 'none'})"
+        )
+    if family is Stack:
+        given = {"parts": {key: from_parameters(**part) for key, part in given["parts"].items()}}
+    return family(**given)

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import product
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from csm._types import FloatArray, IntArray
 from csm.descriptors.acd import unit_rows
-from csm.descriptors.base import Features, as_operators
+from csm.descriptors.base import Descriptor, Features, as_operators
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.operators.operators import Operators
@@ -25,7 +25,7 @@ PAIRS_AT_ONCE = 400_000
 
 
 @dataclass(frozen=True)
-class SHOT:
+class SHOT(Descriptor):
     r"""Histograms of normals in 32 volumes of a ball around each vertex, laid out along a local frame.
 
     The frame of vertex p has the eigenvectors of  sum (R - d_i) (p_i - p)(p_i - p)^T  over its neighbours p_i at
@@ -111,10 +111,6 @@ class SHOT:
             counted = np.bincount(cells.ravel(), (weights * votes.shares).ravel(), values[ball.vertices].size)
             values[ball.vertices] = counted.reshape(-1, values.shape[1])
         return Features(unit_rows(values), self.columns)
-
-    def parameters(self) -> dict[str, Any]:
-        """Return every parameter as plain data."""
-        return asdict(self)
 
 
 class Balls(NamedTuple):

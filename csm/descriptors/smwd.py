@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar, Literal, TypeAlias, get_args
+from dataclasses import dataclass
+from typing import ClassVar, Literal, TypeAlias, get_args
 
 from csm.descriptors.acd import unit_rows
 from csm.descriptors.asmwd import meyer_block
-from csm.descriptors.base import Features, as_operators
+from csm.descriptors.base import Descriptor, Features, as_operators
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.operators.filters import filter_names, mexican_hat_filters
@@ -17,7 +17,7 @@ WaveletVariant: TypeAlias = Literal["meyer", "mexican"]
 
 
 @dataclass(frozen=True)
-class SMWD:
+class SMWD(Descriptor):
     r"""Spectral wavelets of an impulse, each read off at its own centre.
 
     .. math:: f_s(x) = \psi_{s,x}(x) = \sum_{k=1}^{K} g_s(\lambda_k) \, \phi_k(x)^2
@@ -80,7 +80,3 @@ class SMWD:
             greatest = float(spectrum.evals[spectrum.n_zero() :].max())
             values = spectrum.evecs**2 @ mexican_hat_filters(spectrum.evals, self.n_filters, greatest)
         return Features(unit_rows(values) if self.normalise else values, self.columns)
-
-    def parameters(self) -> dict[str, Any]:
-        """Return every parameter as plain data."""
-        return asdict(self)

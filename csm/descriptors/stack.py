@@ -8,14 +8,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from csm.descriptors.base import Descriptor, Features, as_operators, eigenpairs, record
+from csm.descriptors.base import Descriptor, Features, as_operators, record
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.operators.operators import Operators
 
 
 @dataclass(frozen=True)
-class Stack:
+class Stack(Descriptor):
     """The columns of several descriptors, one after the other: a richer input for a network.
 
     Nothing is rescaled, so for nearest neighbours the descriptor with the greatest numbers decides.
@@ -28,7 +28,7 @@ class Stack:
     Raises
     ------
     ConfigError
-        If there is none.
+        If there is no part.
 
     Examples
     --------
@@ -48,8 +48,8 @@ class Stack:
 
     @property
     def eigenpairs(self) -> int:
-        """Of the part that asks for most."""
-        return max(eigenpairs(part) for part in self.parts.values())
+        """Those of the part that asks for most."""
+        return max(part.eigenpairs for part in self.parts.values())
 
     def __call__(self, shape: Mesh | Operators) -> Features:
         """Return the descriptor of every vertex, (N, sum of the parts' columns)."""
@@ -59,5 +59,5 @@ class Stack:
         return Features(np.hstack([features.values for features in found.values()]), tuple(columns))
 
     def parameters(self) -> dict[str, Any]:
-        """Return the family and every parameter of every part as plain data."""
+        """Return the record of every part as plain data."""
         return {"parts": {name: record(part) for name, part in self.parts.items()}}

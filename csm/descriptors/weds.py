@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from csm._types import Float32Array, FloatArray, IntArray
-from csm.descriptors.base import Features, as_operators
+from csm.descriptors.base import Descriptor, Features, as_operators
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.operators.filters import filter_names, mexican_hat_filters
@@ -19,7 +19,7 @@ _NEGLIGIBLE = 1e-9  # of a filter's greatest value: float32 would not feel it, b
 
 
 @dataclass(frozen=True)
-class WEDS:
+class WEDS(Descriptor):
     r"""Energy of the surface's own coordinates in wavelet bands, gathered around every point by wavelets.
 
     With the filters g_s of `csm.operators.filters.mexican_hat_filters`, the coordinates' coefficients
@@ -95,10 +95,6 @@ class WEDS:
         energies = wavelet_energies(evals, evecs, spectrum.mass, operators.mesh.vertices, filters)
         gathering = filters[:, gathering_filters(self.n_filters, self.levels)]
         return Features(aggregate(evecs, gathering, energies), self.columns)
-
-    def parameters(self) -> dict[str, Any]:
-        """Return every parameter as plain data."""
-        return asdict(self)
 
 
 def gathering_filters(n: int, levels: int) -> IntArray:

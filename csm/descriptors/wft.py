@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
-from csm.descriptors.base import Features, as_operators
+from csm.descriptors.base import Descriptor, Features, as_operators
 from csm.descriptors.windowed import ColumnNorm, require_known, surface_functions, unit_columns, windowed_energies
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
@@ -13,7 +13,7 @@ from csm.operators.operators import Operators
 
 
 @dataclass(frozen=True)
-class WFT:
+class WFT(Descriptor):
     """Energy of functions on the surface in heat windows around every point; one column per width and function.
 
     The energy is `csm.descriptors.windowed.windowed_energies` with the isotropic Laplacian.  That the paper's WFT is
@@ -101,7 +101,3 @@ class WFT:
         energies = windowed_energies(operators.lbo(self.k), functions, self.taus)
         values = energies.reshape(len(energies), -1)
         return Features(unit_columns(values, operators.mass, self.normalise), self.columns)
-
-    def parameters(self) -> dict[str, Any]:
-        """Return every parameter as plain data."""
-        return asdict(self)

@@ -1,4 +1,4 @@
-"""What the windowed Fourier transforms share: functions on a surface, and their energy in windows around points."""
+"""Functions on a surface and their energy in windows around points, for the windowed Fourier transforms."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ BANKS = {"geovec": 150, "hks": 100, "wks": 100}
 """Functions of which a number, counted from 1, picks one: "hks80" is the 80th of 100 times."""
 
 SINGLE = ("constant", "fiedler", "shape_index")
-"""Functions that stand alone: 1, the first eigenfunction that is not constant, and `shape_index`."""
+"""Functions without a number: 1, the first eigenfunction that is not constant, and `shape_index`."""
 
 _FLAT = 1e-9  # curvature tensors below this (radians, edge lengths relative to the mean) are rounding
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar, Literal, NamedTuple, TypeAlias, get_args
+from dataclasses import dataclass
+from typing import ClassVar, Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 from scipy.special import softmax
 
 from csm._types import FloatArray
-from csm.descriptors.base import Features, as_operators
+from csm.descriptors.base import Descriptor, Features, as_operators
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.operators.operators import Operators
@@ -18,7 +18,7 @@ WaveVariant: TypeAlias = Literal["aubry", "functional_map"]
 
 
 @dataclass(frozen=True)
-class WKS:
+class WKS(Descriptor):
     r"""Chance of meeting a quantum particle of log-energy e at a point, for evenly spaced e.
 
     .. math::
@@ -68,10 +68,6 @@ class WKS:
         kept = slice(0 if self.variant == "aubry" else zeros, None)
         values = wave_kernel_signature(spectrum.evals[kept], spectrum.evecs[:, kept], band)
         return Features(values, tuple(f"e={e:.3f}" for e in band.energies))
-
-    def parameters(self) -> dict[str, Any]:
-        """Return every parameter as plain data."""
-        return asdict(self)
 
 
 class WaveBand(NamedTuple):

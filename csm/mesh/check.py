@@ -1,7 +1,7 @@
-"""What is wrong or unusual about a mesh: findings with counts and first offenders.  Nothing is repaired.
+"""Check a mesh for defects and peculiarities: findings with counts and the first vertices or faces.  No repairs.
 
-Findings of severity "error" are what a spectral operator cannot live with: it would divide by zero, get a singular
-mass matrix, or spread a NaN.  Findings of severity "note" change what a result means, and are kept beside it.
+On a mesh with findings of severity "error" spectral operators fail: they would divide by zero, get a singular mass
+matrix, or spread a NaN.  Findings of severity "note" change what a result means, and are stored beside it.
 Indices out of range and 1-based files never get here, because `Mesh` and the readers refuse them.
 """
 
@@ -14,12 +14,11 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from csm._types import BoolArray, IntArray
 from csm.errors import MeshError
 from csm.mesh.shape import Mesh
+from csm.mesh.topology import components, edge_keys
 
 Severity = Literal["error", "note"]
 
@@ -59,7 +58,7 @@ class Finding:
 
 
 def check(mesh: Mesh) -> tuple[Finding, ...]:
-    """Look for everything this module knows of; errors come first.
+    """Return all findings about a mesh; errors come first.
 
     Examples
     --------
@@ -104,8 +103,8 @@ class _Topology:
     @cached_property
     def edge_of(self) -> IntArray:
         """Number of the undirected edge under each half-edge, shape (3 M,)."""
-        low, high = np.minimum(self.tails, self.heads), np.maximum(self.tails, self.heads)
-        return np.unique(low * self.mesh.n_vertices + high, return_inverse=True)[1].ravel()
+        keys = edge_keys(self.tails, self.heads, self.mesh.n_vertices)
+        return np.unique(keys, return_inverse=True)[1].ravel()
 
     @cached_property
     def referenced(self) -> BoolArray:
@@ -129,7 +128,7 @@ class _Topology:
 def _found(
     kind: str, severity: Severity, what: str, where: NDArray[np.integer], count: int | None = None, at: str = ""
 ) -> Finding:
-    """Make a finding whose text is the phrase, the count and the first offenders."""
+    """Make a finding whose text is the phrase, the count and the first affected vertices or faces."""
     count = len(where) if count is None else count
     first = tuple(int(i) for i in where[:_N_FIRST])
     shown = at + ", ".join(map(str, first)) + (", ..." if len(where) > len(first) else "")
@@ -233,7 +232,7 @@ def _fans(t: _Topology) -> Iterator[Finding]:
     same_way = t.tails[a] == t.tails[b]
     rows = np.concatenate([a, after[a]])
     columns = np.concatenate([np.where(same_way, b, after[b]), np.where(same_way, after[b], b)])
-    fan = connected_components(_graph(rows, columns, n_corners), directed=False)[1]
+    fan = components(rows, columns, n_corners)
     first_corner = np.unique(fan, return_index=True)[1]
     n_fans = np.bincount(t.tails[first_corner], minlength=t.mesh.n_vertices)
     where = np.flatnonzero(n_fans > 1)
@@ -242,16 +241,12 @@ def _fans(t: _Topology) -> Iterator[Finding]:
 
 
 def _components(t: _Topology) -> Iterator[Finding]:
-    label = connected_components(_graph(t.tails, t.heads, t.mesh.n_vertices), directed=False)[1]
+    label = components(t.tails, t.heads, t.mesh.n_vertices)
     used = np.flatnonzero(t.referenced)
     first = used[np.unique(label[used], return_index=True)[1]]
     if len(first) > 1:
         where = np.sort(first)
         yield _found("several_components", "note", "components", where, at="first vertices ")
-
-
-def _graph(rows: IntArray, columns: IntArray, n: int) -> coo_array:
-    return coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(n, n))
 
 
 def _scale(t: _Topology) -> Iterator[Finding]:

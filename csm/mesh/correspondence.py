@@ -1,6 +1,6 @@
 """Point maps between a template and shapes, with their direction in the type, and ground truth through the template.
 
-Which way a map goes is what users of the field's files stumble over most, so it is never implied:
+The direction of a map is the most common mistake with the field's files, so it is never implied:
 
 - a `.vts` file (SGA18, FAUST_r, SHREC'19) and the `labels` of the ACD release go template -> shape, 1-based;
 - label lists of other benchmarks go shape -> template, often 0-based.
@@ -91,13 +91,8 @@ class PointMap:
 
     @property
     def known(self) -> IntArray:
-        """The counterparts that there are, without -1, in the order of the "from" side."""
+        """The indices without -1, in the order of the "from" side."""
         return self.indices[self.indices >= 0]
-
-    @property
-    def n_known(self) -> int:
-        """Number of points that have a counterpart."""
-        return int((self.indices >= 0).sum())
 
     def as_template_to_shape(self, n_template: int | None = None) -> PointMap:
         """Return this map in the direction template -> shape.

@@ -1,4 +1,4 @@
-"""Damage a mesh on purpose: noise, missing parts, and surfaces that have grown together where they come near."""
+"""Synthetic damage of a mesh: noise, missing parts, and topological noise, a bridge between two near parts."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.csgraph import dijkstra
 from scipy.spatial.distance import cdist
 
 from csm._types import IntArray
 from csm.errors import MeshError
 from csm.mesh.shape import Mesh
+from csm.mesh.topology import components, edge_graph, half_edges
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +55,7 @@ def without_part(mesh: Mesh, centre: int, fraction: float) -> Damaged:
     MeshError
         If nothing would be left.
     """
-    distance = np.asarray(dijkstra(_edge_lengths(mesh), directed=False, indices=[centre]))[0]
+    distance = np.asarray(dijkstra(edge_graph(mesh.vertices, mesh.faces), indices=[centre]))[0]
     reach = distance[mesh.faces].max(axis=1)
     order = np.argsort(reach, kind="stable")
     cut = order[np.cumsum(mesh.face_areas[order]) <= fraction * mesh.area]
@@ -65,7 +66,7 @@ def without_part(mesh: Mesh, centre: int, fraction: float) -> Damaged:
 
 
 def grown_together(mesh: Mesh, far: float = 0.5) -> Damaged:
-    """Join the surface with itself by a bridge where it comes nearest to itself, as scanners do with touching limbs.
+    """Join the two nearest parts of the surface by a bridge, as happens to touching limbs in scans.
 
     One face at either end gives way to a tube of six; vertices stay, and a closed surface gets one more handle.
 
@@ -87,18 +88,8 @@ def grown_together(mesh: Mesh, far: float = 0.5) -> Damaged:
     return Damaged(Mesh(mesh.vertices, faces, mesh.name), np.arange(mesh.n_vertices))
 
 
-def _edge_lengths(mesh: Mesh) -> csr_array:
-    """Return the edge graph, (N, N), each edge once with its length."""
-    begin, end = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
-    length = np.linalg.norm(mesh.vertices[begin] - mesh.vertices[end], axis=1)
-    ends, first = np.unique(np.sort(np.stack([begin, end]), axis=0), axis=1, return_index=True)
-    return csr_array((length[first], (ends[0], ends[1])), shape=(mesh.n_vertices,) * 2)
-
-
 def _largest_component(mesh: Mesh, faces: IntArray) -> Damaged:
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
-    graph = csr_array((np.ones(len(edges)), edges.T), shape=(mesh.n_vertices,) * 2)
-    label = connected_components(graph, directed=False)[1]
+    label = components(*half_edges(faces), mesh.n_vertices)
     areas = np.bincount(label[faces[:, 0]], Mesh(mesh.vertices, faces, mesh.name).face_areas)
     faces = faces[label[faces[:, 0]] == areas.argmax()]
     kept, inverse = np.unique(faces, return_inverse=True)
@@ -107,7 +98,7 @@ def _largest_component(mesh: Mesh, faces: IntArray) -> Damaged:
 
 def _contact(mesh: Mesh, far: float) -> tuple[int, int]:
     """Return two faces, near in space and `far` along the surface: the best of a sample, then the best around it."""
-    graph = _edge_lengths(mesh)
+    graph = edge_graph(mesh.vertices, mesh.faces)
     sample = np.unique(np.linspace(0, mesh.n_vertices - 1, 400).astype(np.int64))
     for _ in range(2):
         begin, end = _nearest_of_far(mesh, graph, sample, far)
@@ -122,7 +113,7 @@ def _contact(mesh: Mesh, far: float) -> tuple[int, int]:
 
 
 def _nearest_of_far(mesh: Mesh, graph: csr_array, sample: IntArray, far: float) -> tuple[int, int]:
-    way = np.asarray(dijkstra(graph, directed=False, indices=sample))
+    way = np.asarray(dijkstra(graph, indices=sample))
     gaps = cdist(mesh.vertices[sample], mesh.vertices)
     gaps[~((way >= far) & np.isfinite(way))] = np.inf
     if np.isinf(gaps).all():

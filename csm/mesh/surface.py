@@ -14,6 +14,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from csm._types import BoolArray, FloatArray, IntArray
 from csm.mesh.shape import Mesh
+from csm.mesh.topology import half_edges
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +124,7 @@ class Surface:
         lengths that are a little too long.
         """
         n, p = self.mesh.n_vertices, len(marks.faces)
-        a, b = np.concatenate([self.mesh.faces[:, [k, (k + 1) % 3]] for k in range(3)]).T
+        a, b = half_edges(self.mesh.faces)
         corner = self.mesh.faces[marks.faces]
         where = marks.interpolate(self.mesh, self.mesh.vertices)
         to_corner = np.linalg.norm(self.mesh.vertices[corner] - where[:, None], axis=2).ravel()

@@ -1,4 +1,4 @@
-"""Laplacians of a mesh and what they are made of: frames, stiffness, spectra, geodesic distances."""
+"""Operators of a mesh: face frames, anisotropic and isotropic Laplacians, their spectra, geodesic distances."""
 
 from csm.operators.operators import Memo, Operators
 from csm.operators.spectrum import Spectrum

@@ -8,6 +8,7 @@ import numpy as np
 
 from csm._types import FloatArray, IntArray
 from csm.mesh.shape import Mesh
+from csm.mesh.topology import edge_keys, half_edges
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +40,8 @@ class InteriorEdges:
 
 def interior_edges(mesh: Mesh) -> InteriorEdges:
     """Return the interior edges of a consistently oriented mesh."""
-    tail, head = mesh.faces.ravel(), mesh.faces[:, [1, 2, 0]].ravel()
-    key = np.minimum(tail, head) * mesh.n_vertices + np.maximum(tail, head)
+    tail, head = half_edges(mesh.faces)
+    key = edge_keys(tail, head, mesh.n_vertices)
     order = np.argsort(key, kind="stable")
     _, start, count = np.unique(key[order], return_index=True, return_counts=True)
     first, second = order[start[count == 2]], order[start[count == 2] + 1]

@@ -1,4 +1,4 @@
-"""Attempts at a symmetric sparse eigenproblem, and the checks that decide whether one is believed."""
+"""Attempts to solve a symmetric sparse eigenproblem, and the checks that accept or reject the eigenpairs."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Problem(NamedTuple):
 
 
 class Attempt(NamedTuple):
-    """One way to solve it, by Lanczos steps of so many vectors; of none (`block` = 0) densely."""
+    """One way to solve the problem: by Lanczos steps with blocks of `block` vectors, or densely if that is 0."""
 
     method: str
     shift: float
@@ -41,7 +41,7 @@ class Pairs(NamedTuple):
 
 
 def attempts(problem: Problem) -> tuple[Attempt, ...]:
-    """Return the ways to try, best first."""
+    """Return the attempts to make, the best first."""
     n, k = problem.matrix.shape[0], problem.k
     if n < _DENSE_BELOW or k > n // 4:
         return (Attempt("the dense solver", 0.0, 0),)
@@ -55,7 +55,7 @@ def attempts(problem: Problem) -> tuple[Attempt, ...]:
 
 
 def attempt_once(problem: Problem, attempt: Attempt) -> tuple[Pairs | None, str]:
-    """Return the pairs if they are sound, else None and what is wrong."""
+    """Return the eigenpairs if they pass the checks, else None and what is wrong."""
     try:
         found = _solve(problem, attempt)
         fault = _fault(problem, found)
@@ -101,7 +101,7 @@ def _lanczos(operator: Callable[[FloatArray], FloatArray], n: int, k: int, block
     they do, and blocks of vectors are solved for and made orthogonal at several times the speed of single ones.
     """
     limit = min(6 * k + 40 * block, n - block) // block * block
-    basis = np.empty((n, limit + block), order="F")  # room that is not used is never touched
+    basis = np.empty((n, limit + block), order="F")  # unused columns take no memory
     reduced = np.zeros((limit + block, limit + block))  # the operator in the basis, lower half, block tridiagonal
     basis[:, :block] = np.linalg.qr(np.random.default_rng(0).standard_normal((n, block)))[0]
     look = 2.5 * k + 17 * block - 10  # where meshes are about to converge

@@ -1,4 +1,4 @@
-"""Which propagations answer a list of vertex pairs with the least work."""
+"""The sources to propagate geodesic distances from, for a list of vertex pairs, with the least work."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class PairPlan:
     targets
         Shape (T,).
     inverse
-        Shape (P,): the place in `targets` that answers each pair of the question.
+        Shape (P,): the index in `targets` of each pair that was asked for.
     """
 
     sources: IntArray
@@ -37,7 +37,7 @@ def plan_pairs(vertices: FloatArray, sources: IntArray, targets: IntArray, symme
     Parameters
     ----------
     vertices
-        Shape (N, 3), to tell far pairs (dear) from near ones (cheap).
+        Shape (N, 3); a far pair costs more than a near one.
     sources, targets
         Shape (P,) each.
     symmetric
@@ -60,7 +60,7 @@ def plan_pairs(vertices: FloatArray, sources: IntArray, targets: IntArray, symme
 def _cover(n: int, first: IntArray, second: IntArray, length: FloatArray) -> np.ndarray:
     """Choose the source side of each pair: a small vertex cover, far pairs first, since a propagation costs its area.
 
-    A near pair is turned to an endpoint that already serves a farther one; otherwise to the endpoint with more pairs.
+    The source of a near pair is the endpoint that is the source of a farther one already, else the one with more pairs.
     """
     octave = np.floor(np.log2(np.maximum(length, np.finfo(np.float64).tiny))).astype(np.int64)
     chosen = np.zeros(n, dtype=bool)

@@ -17,6 +17,7 @@ from scipy import sparse
 from csm._types import ComplexArray, FloatArray
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
+from csm.mesh.topology import directed_edges
 from csm.operators._edges import FaceBasis, dot, interior_edges, longest_edge_basis, unit
 from csm.operators.linefield import smooth_line_field
 
@@ -114,11 +115,9 @@ def edge_tensors(mesh: Mesh) -> FloatArray:
 
 def smooth(mesh: Mesh, tensors: FloatArray, sweeps: int) -> FloatArray:
     """Replace each vertex's tensor by the plain mean over itself and its neighbours, `sweeps` times."""
-    i, j = mesh.faces[:, [0, 1, 2]].ravel(), mesh.faces[:, [1, 2, 0]].ravel()
     n = mesh.n_vertices
-    ones = np.ones(2 * len(i))
-    adjacency = sparse.csr_array((ones, (np.concatenate([i, j]), np.concatenate([j, i]))), shape=(n, n))
-    adjacency.data[:] = 1.0
+    edges = directed_edges(mesh.faces, n)
+    adjacency = sparse.csr_array((np.ones(len(edges.targets)), edges), shape=(n, n))
     ring = adjacency + sparse.eye_array(n)
     mean = sparse.csr_array(sparse.diags_array(1.0 / ring.sum(axis=1)) @ ring)
     flat = tensors.reshape(n, 9)

@@ -11,13 +11,13 @@ from typing import Literal, Protocol, TypeAlias, get_args
 import numpy as np
 import potpourri3d
 from pygeodesic.geodesic import PyGeodesicAlgorithmExact
-from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.csgraph import dijkstra
 
 from csm._types import BoolArray, FloatArray, IntArray
 from csm.errors import ConfigError, MeshError
 from csm.mesh.check import check
 from csm.mesh.shape import Mesh
+from csm.mesh.topology import components, edge_graph, half_edges
 from csm.operators._pairs import PairPlan, plan_pairs
 
 Method: TypeAlias = Literal["exact", "heat", "edge"]
@@ -37,7 +37,20 @@ class Geodesics(Protocol):
         """Return the distance from ``sources[i]`` to ``targets[i]``, shape (P,), without computing whole rows."""
 
     def diameter(self, max_rows: int = 8) -> float:
-        """Estimate the largest distance from below; see `diameter`."""
+        """Estimate the largest distance between two vertices of the largest component, from below.
+
+        Sweeps from a vertex to the one farthest from it as long as the distance grows.  Then goes on where it could be
+        larger still: from a row at s with largest entry e(s), no vertex v has a distance above ``d(s, v) + e(s)``.
+
+        A lower bound of the diameter, and at least half of it.  Measured with 8 rows, edge-graph distances and three
+        starts on bodies and animals of FAUST, SCAPE and TOSCA: at least 0.998 of the largest of all N x N distances
+        (plain double sweeps: 0.983); on shapes like a ball with bumps it was 0.90 at worst.
+
+        Parameters
+        ----------
+        max_rows
+            Rows computed at most.
+        """
 
 
 def geodesics(mesh: Mesh, method: Method = "exact") -> Geodesics:
@@ -68,30 +81,8 @@ def geodesics(mesh: Mesh, method: Method = "exact") -> Geodesics:
     return kinds[method](mesh)
 
 
-def diameter(mesh: Mesh, method: Method = "exact", *, max_rows: int = 8) -> float:
-    """Estimate the largest distance between two vertices of the largest component, from below.
-
-    Sweeps from a vertex to the one farthest from it as long as the distance grows.  Then goes on where it could be
-    larger still: from a row at s with largest entry e(s), no vertex v has a distance above ``d(s, v) + e(s)``.
-
-    A lower bound of the diameter, and at least half of it.  Measured with 8 rows, edge-graph distances and three
-    starts on bodies and animals of FAUST, SCAPE and TOSCA: at least 0.998 of the largest of all N x N distances (plain
-    double sweeps: 0.983); on shapes like a ball with bumps it was 0.90 at worst.
-
-    Parameters
-    ----------
-    mesh
-        N vertices; the component with the most vertices counts.
-    method
-        As for `geodesics`.
-    max_rows
-        Rows computed at most.
-    """
-    return geodesics(mesh, method).diameter(max_rows)
-
-
 class _OnMesh:
-    """What the methods share: unused vertices are left out, and components never meet."""
+    """Base of the methods: unused vertices are left out, and distances between components are infinite."""
 
     method: str
     symmetric = True
@@ -105,8 +96,8 @@ class _OnMesh:
         self.faces: IntArray = faces.reshape(-1, 3).astype(np.int64)
         self.local = np.full(mesh.n_vertices, -1)
         self.local[self.used] = np.arange(len(self.used))
-        self.graph = _edge_graph(self.vertices, self.faces)
-        self.component = connected_components(self.graph, directed=False)[1]
+        self.graph = edge_graph(self.vertices, self.faces)
+        self.component = components(*half_edges(self.faces), len(self.used))
         self._prepare()
 
     def rows(self, sources: IntArray) -> FloatArray:
@@ -219,17 +210,6 @@ class _Edge(_OnMesh):
     def _dijkstra(self, source: int, limit: float) -> FloatArray:
         row: FloatArray = dijkstra(self.graph, indices=np.array([source]), limit=limit)[0]
         return row
-
-
-def _edge_graph(vertices: FloatArray, faces: IntArray) -> csr_array:
-    edges = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
-    edges = edges[edges[:, 0] != edges[:, 1]]
-    lengths = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
-    # A stored zero would vanish from the graph, so coincident neighbours get the smallest positive length instead.
-    lengths = np.maximum(lengths, np.finfo(np.float64).tiny)
-    both = np.concatenate([edges, edges[:, ::-1]])  # a graph of one direction would be mirrored for every source
-    n = len(vertices)
-    return coo_array((np.tile(lengths, 2), (both[:, 0], both[:, 1])), shape=(n, n)).tocsr()
 
 
 def _require_window_propagation(mesh: Mesh) -> None:

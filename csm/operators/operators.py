@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -27,7 +28,7 @@ _log = logging.getLogger(__name__)
 
 
 class Memo(Protocol):
-    """Somewhere to look results up and keep them, such as `csm.data.store.Store`."""
+    """Where results are looked up and kept, such as `csm.data.store.Store`."""
 
     def fetch(self, kind: str, mesh: Mesh, params: Mapping[str, Any], make: Callable[[], Arrays]) -> Arrays:
         """Return what is kept for `kind`, the geometry of `mesh` and the plain-data `params`, or make and keep it."""
@@ -35,9 +36,9 @@ class Memo(Protocol):
 
 
 class Operators:
-    """Laplacians and spectra of one mesh, lazy and memoised.
+    """Laplacians and spectra of one mesh, computed when first asked for and kept.
 
-    The pairs of a Laplacian that were computed before, if they are enough, serve a later wish for fewer of them.
+    When fewer eigenpairs of a Laplacian are asked for than were computed before, they are taken from those.
 
     Parameters
     ----------
@@ -46,7 +47,7 @@ class Operators:
     unit_area
         Scale it to a surface area of 1 first, as every default in csm assumes; `self.mesh.scale` keeps the way back.
     memo
-        Where spectra are looked up and kept beyond this object; without one they live as long as it does.
+        Where spectra are looked up, and kept longer than this object, such as a `csm.data.store.Store`.
 
     Raises
     ------
@@ -130,18 +131,16 @@ class Operators:
         key = (kind, tuple(params.items()))
         if key not in self._spectra:
             larger = self._larger(kind, params)
-            if larger is not None:
-                self._spectra[key] = larger.first(params["k"])
-            elif self._memo is None:
-                self._spectra[key] = solve()
+            make = solve if larger is None else partial(larger.first, params["k"])
+            if self._memo is None:
+                self._spectra[key] = make()
             else:
-                self._spectra[key] = _from_arrays(
-                    self._memo.fetch(kind, self.mesh, params, lambda: _to_arrays(solve()))
-                )
+                arrays = self._memo.fetch(kind, self.mesh, params, lambda: _to_arrays(make()))
+                self._spectra[key] = _from_arrays(arrays)
         return self._spectra[key]
 
     def _larger(self, kind: str, params: dict[str, Any]) -> Spectrum | None:
-        """Return a spectrum of the same Laplacian with more pairs that is already here, if there is one."""
+        """Return a spectrum of the same Laplacian with more eigenpairs that was computed before, if there is one."""
         for (other, items), spectrum in self._spectra.items():
             if other == kind and len(spectrum.evals) > params["k"] and {**dict(items), "k": params["k"]} == params:
                 return spectrum

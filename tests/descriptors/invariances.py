@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from csm.descriptors import Descriptor
+from csm.descriptors import Descriptor, from_parameters
+from csm.descriptors.base import record
 from csm.mesh.shape import Mesh
 from csm.operators import Operators
 from tests.shapes import blob, rotation
@@ -31,7 +32,7 @@ def columns_and_parameters(descriptor: Descriptor) -> None:
     assert len(set(features.columns)) == len(features.columns)
     assert np.isfinite(features.values).all()
     assert isinstance(descriptor, Descriptor)
-    assert type(descriptor)(**json.loads(json.dumps(descriptor.parameters()))) == descriptor
+    assert from_parameters(**json.loads(json.dumps(record(descriptor)))) == descriptor
 
 
 def rigid_motion(descriptor: Descriptor) -> None:

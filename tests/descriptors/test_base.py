@@ -1,20 +1,38 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 
-from csm.descriptors import ACD, GPS, HKS, SHOT, SMWD, WEDS, WKS, Descriptor, Stack
-from csm.descriptors.base import as_operators, eigenpairs
+from csm.descriptors import (
+    ACD,
+    DEP,
+    GPS,
+    HKS,
+    SHOT,
+    SMWD,
+    WEDS,
+    WKS,
+    Descriptor,
+    Features,
+    Stack,
+    from_parameters,
+    preset,
+)
+from csm.descriptors.base import as_operators, record
+from csm.errors import ConfigError
 from csm.operators import Operators
 from tests.shapes import blob, rotation
 
 SMALL = [
-    ACD(angles=4, k=10),
-    ACD(alpha=4.0, angles=3, k=30, order=5, normalise=True),
-    ACD(alpha=0.0, angles=1, k=20),
+    preset("acd_paper", angles=4),
+    preset("acd_paper", alpha=4.0, angles=3, k=30, order=5, normalise=True),
+    preset("acd_isotropic", k=20),
+    ACD(angles=3),
     HKS(k=40, n_times=10),
     WKS(k=40, n_energies=30),
     WKS(k=40, n_energies=40, variant="functional_map"),
@@ -31,7 +49,7 @@ def test_rows_columns_and_plain_parameters(descriptor):
     assert len(set(features.columns)) == len(features.columns)
     assert np.isfinite(features.values).all()
     assert isinstance(descriptor, Descriptor)
-    assert type(descriptor)(**json.loads(json.dumps(descriptor.parameters()))) == descriptor
+    assert from_parameters(**json.loads(json.dumps(record(descriptor)))) == descriptor
 
 
 @each
@@ -89,20 +107,100 @@ def test_operators_are_used_as_they_are():
 
 
 ASKING = [
-    ACD(angles=4, k=10),
+    ACD(angles=4),
     HKS(k=40),
     SMWD(k=20),
     WEDS(k=50),
     GPS(k=7),
     SHOT(),
+    DEP(n_scales=1),
+    DEP(n_scales=1, distance="biharmonic", k=20),
     Stack({"a": GPS(k=7), "b": HKS(k=9)}),
 ]
 
 
-@pytest.mark.parametrize("descriptor", ASKING, ids=lambda descriptor: descriptor.name)
+@pytest.mark.parametrize("descriptor", ASKING, ids=repr)
 def test_a_descriptor_says_how_many_eigenpairs_it_asks_for(descriptor, monkeypatch):
     asked = [0]
     solve = Operators._solve
     monkeypatch.setattr(Operators, "_solve", lambda self, matrix, k: asked.append(k) or solve(self, matrix, k))
     descriptor(blob(3))
-    assert max(asked) == eigenpairs(descriptor)
+    assert max(asked) == descriptor.eigenpairs
+
+
+@dataclass(frozen=True)
+class Heights(Descriptor):
+    """A family as somebody would add it: its second formula, with a parameter that the first release had not."""
+
+    k: int = 3
+    factor: float = 2.0
+
+    name: ClassVar[str] = "heights"
+    version: ClassVar[int] = 2
+    added: ClassVar[dict[str, Any]] = {"factor": 1.0}
+
+    def __call__(self, shape):
+        return Features(self.factor * as_operators(shape).mesh.vertices[:, 2:], ("z",))
+
+
+def test_a_family_states_its_fields_and_gets_the_rest():
+    assert Heights().parameters() == {"k": 3, "factor": 2.0}
+    assert Heights(factor=1.0).parameters() == {"k": 3}, "keys from before there was a factor stay"
+    assert record(Heights(factor=1.0)) == {"name": "heights", "k": 3, "version": 2}
+    assert record(HKS(k=40)) == {"name": "hks", "k": 40, "n_times": 100, "scaled": True}, "without the first version"
+    assert (Heights(k=7).eigenpairs, SHOT().eigenpairs, GPS(k=7).eigenpairs) == (7, 0, 8)
+
+
+def test_a_family_that_cannot_be_called_is_none():
+    class Nothing(Descriptor):
+        name = "nothing"
+
+    with pytest.raises(TypeError, match="__call__"):
+        Nothing()
+
+
+@pytest.mark.parametrize(
+    ("shape", "came"),
+    [
+        ("tr_reg_000.off", "the str 'tr_reg_000.off'"),
+        (Path("a/b.off"), r"the PosixPath 'a.b\.off'"),
+        (np.zeros((5, 3)), r"an array of shape \(5, 3\)"),
+        (None, "a NoneType"),
+    ],
+)
+@pytest.mark.parametrize("descriptor", [HKS(), ACD(), SHOT(), Stack({"a": WKS()})], ids=lambda each: each.name)
+def test_what_is_no_shape_is_refused_by_name(descriptor, shape, came):
+    with pytest.raises(ConfigError, match=f"{came}.*csm.read_mesh"):
+        descriptor(shape)
+
+
+def features(q: int = 3) -> Features:
+    return Features(np.arange(4.0 * q).reshape(4, q), tuple("abc"[:q]))
+
+
+def test_features_are_an_array_to_numpy():
+    found = features()
+    assert np.asarray(found) is found.values
+    assert (len(found), found.shape, np.shape(found)) == (4, (4, 3), (4, 3))
+    np.testing.assert_array_equal(np.linalg.norm(found, axis=1), np.linalg.norm(found.values, axis=1))
+    single = np.asarray(found, dtype=np.float32)
+    assert single.dtype == np.float32
+    np.testing.assert_array_equal(single, found.values)
+    copied = np.array(found)
+    assert not np.shares_memory(copied, found.values)
+    np.testing.assert_array_equal(copied, found.values)
+
+
+def test_features_keep_the_rules_of_numpy_for_copies():
+    found = features()
+    assert found.__array__() is found.values
+    assert found.__array__(np.float64, copy=False) is found.values
+    assert not np.shares_memory(found.__array__(copy=True), found.values)
+    assert found.__array__(np.float32, copy=True).dtype == np.float32
+    with pytest.raises(ValueError, match="only as a copy"):
+        found.__array__(np.float32, copy=False)
+
+
+def test_features_are_shown_in_one_line():
+    assert repr(features()) == "Features(4 vertices, 3 columns: a ... c)"
+    assert repr(features(1)) == "Features(4 vertices, 1 columns: a)"

@@ -20,7 +20,7 @@ def point_maps(draw, direction=TO_SHAPE, n_from=None, n_to=None):
 def test_identity_onto_the_first_vertices():
     found = PointMap.identity(3, 5)
     assert found.indices.tolist() == [0, 1, 2]
-    assert (found.direction, found.n_from, found.n_to, found.n_known) == (TO_SHAPE, 3, 5, 3)
+    assert (found.direction, found.n_from, found.n_to, len(found.known)) == (TO_SHAPE, 3, 5, 3)
     with pytest.raises(DataError, match="point 3 goes to 3"):
         PointMap.identity(5, 3)
 

@@ -14,7 +14,7 @@ from csm.errors import ConfigError, MeshError
 from csm.mesh.io import read_mesh
 from csm.mesh.shape import Mesh
 from csm.operators._pairs import plan_pairs
-from csm.operators.geodesic import Method, diameter, geodesics
+from csm.operators.geodesic import Method, geodesics
 from tests.shapes import blob, cylinder, plane, sphere, torus
 
 METHODS: list[Method] = ["exact", "heat", "edge"]
@@ -103,16 +103,16 @@ def test_relabelling_and_scale() -> None:
 
 
 def test_diameter_of_known_shapes() -> None:
-    assert diameter(plane(), "exact") == pytest.approx(np.sqrt(2))
-    assert diameter(sphere(3, radius=2.0), "exact") == pytest.approx(2 * np.pi, rel=0.01)
-    assert diameter(two_pieces(), "edge") == pytest.approx(2.0)
+    assert geodesics(plane(), "exact").diameter() == pytest.approx(np.sqrt(2))
+    assert geodesics(sphere(3, radius=2.0), "exact").diameter() == pytest.approx(2 * np.pi, rel=0.01)
+    assert geodesics(two_pieces(), "edge").diameter() == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_diameter_is_a_lower_bound_that_more_rows_tighten(seed: int) -> None:
     mesh = blob(2, seed)
     truth = all_rows(mesh, "edge").max()
-    few, many = diameter(mesh, "edge"), diameter(mesh, "edge", max_rows=mesh.n_vertices)
+    few, many = geodesics(mesh, "edge").diameter(), geodesics(mesh, "edge").diameter(max_rows=mesh.n_vertices)
     assert 0.85 * truth <= few <= truth + 1e-12
     assert many == pytest.approx(truth)
 

@@ -9,7 +9,7 @@ import pytest
 from csm.errors import MeshError
 from csm.mesh.shape import Mesh
 from csm.operators import Operators
-from csm.operators import operators as operators_module as module
+from csm.operators import operators as module
 from tests.shapes import blob, sphere
 
 
@@ -80,6 +80,32 @@ def test_a_memo_is_asked_with_plain_data_and_its_answer_is_the_same():
             np.testing.assert_array_equal(getattr(made, field), getattr(kept, field))
         assert (made.residual, made.notes) == (kept.residual, kept.notes)
     assert shelf.made == ["lbo", "albo"]
+
+
+def test_a_memo_also_gets_fewer_pairs_that_were_taken_from_more(monkeypatch):
+    solved, shelf, mesh = [], Shelf(), blob(3)
+    honest = module.eigenpairs
+    monkeypatch.setattr(module, "eigenpairs", lambda *a, **k: solved.append(a[2]) or honest(*a, **k))
+    for ask in (lambda o, k: o.lbo(k), lambda o, k: o.albo(10, 0.5, k)):
+        first, later = Operators(mesh, memo=shelf), Operators(mesh, memo=shelf)
+        more, fewer = ask(first, 30), ask(first, 12)
+        np.testing.assert_array_equal(fewer.evecs, more.evecs[:, :12])
+        assert fewer is ask(first, 12)
+        again = ask(later, 12)
+        for field in ("evals", "evecs", "mass"):
+            np.testing.assert_array_equal(getattr(again, field), getattr(fewer, field))
+        assert (again.residual, again.notes) == (more.residual, more.notes)
+    assert solved == [30, 30], "fewer pairs are solved for neither in the first place nor when looked up later"
+    assert shelf.made == ["lbo", "lbo", "albo", "albo"]
+
+
+def test_what_a_memo_holds_already_is_not_replaced_by_a_part_of_more():
+    mesh, shelf = blob(2), Shelf()
+    own = Operators(mesh, memo=shelf).lbo(6)
+    both = Operators(mesh, memo=shelf)
+    both.lbo(20)
+    np.testing.assert_array_equal(both.lbo(6).evecs, own.evecs)
+    assert shelf.made == ["lbo", "lbo"]
 
 
 def test_every_parameter_is_part_of_the_memo_key():

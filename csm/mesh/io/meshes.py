@@ -1,4 +1,4 @@
-"""`read_mesh` and `write_mesh`: one door to all mesh formats."""
+"""`read_mesh` and `write_mesh` for all mesh formats."""
 
 from __future__ import annotations
 
@@ -55,8 +55,8 @@ WRITABLE: tuple[str, ...] = (".off", ".ply", ".obj")
 def read_mesh(path: str | os.PathLike[str], name: str | None = None) -> Mesh:
     """Read a triangle mesh; the suffix (.off .ply .obj .stl .npz .mat) says the format.
 
-    Vertex order and number are the file's: nothing is merged, split, dropped or scaled.  An .stl file is a soup of
-    separate triangles and stays one.
+    Vertex order and number are the file's: nothing is merged, split, dropped or scaled.  The triangles of an
+    .stl file share no vertices and are not joined.
 
     Parameters
     ----------

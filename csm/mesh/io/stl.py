@@ -1,4 +1,4 @@
-"""The STL format: a soup of triangles that share no vertices."""
+"""The STL format: separate triangles that share no vertices."""
 
 from __future__ import annotations
 

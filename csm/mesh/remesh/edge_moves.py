@@ -12,6 +12,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from csm._types import BoolArray, FloatArray, IntArray
+from csm.mesh.topology import edge_keys
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +50,7 @@ def edge_table(faces: IntArray) -> EdgeTable:
     n = int(faces.max()) + 1
     a, b, c = (np.concatenate([faces[:, (k + s) % 3] for k in range(3)]) for s in range(3))
     backwards = (a > b).astype(np.int64)
-    keys, number = np.unique(np.minimum(a, b) * n + np.maximum(a, b), return_inverse=True)
+    keys, number = np.unique(edge_keys(a, b, n), return_inverse=True)
     table = EdgeTable(np.column_stack([keys // n, keys % n]), np.full((len(keys), 2), -1), np.full((len(keys), 2), -1))
     table.faces[number, backwards] = np.tile(np.arange(len(faces)), 3)
     table.opposite[number, backwards] = c
@@ -85,8 +86,7 @@ def split(faces: IntArray, table: EdgeTable, edges: IntArray, first_vertex: int)
 def flip(faces: IntArray, table: EdgeTable, edges: IntArray) -> IntArray:
     """Flip independent inner edges whose new edge does not exist yet; of edges with the same new edge the first."""
     n = int(faces.max()) + 1
-    low, high = table.opposite[edges].min(axis=1), table.opposite[edges].max(axis=1)
-    crossing = low * n + high
+    crossing = edge_keys(table.opposite[edges, 0], table.opposite[edges, 1], n)
     first = np.zeros(len(edges), dtype=bool)
     first[np.unique(crossing, return_index=True)[1]] = True
     edges = edges[first & ~np.isin(crossing, table.ends[:, 0] * n + table.ends[:, 1])]
@@ -107,8 +107,8 @@ def adjacency(table: EdgeTable, n: int) -> csr_array:
 def collapsible(table: EdgeTable, edges: IntArray, n: int) -> BoolArray:
     """Which edges can be collapsed without changing the topology (the link condition), shape (len(edges),).
 
-    The ends must have as many common neighbours as the edge has faces, each of them with a neighbour to spare, and an
-    inner edge must not join two boundary vertices.
+    The ends must have as many common neighbours as the edge has faces, each of them with more than three
+    neighbours (two on the boundary), and an inner edge must not join two boundary vertices.
     """
     link = adjacency(table, n)
     i, j = table.ends[edges].T

@@ -1,4 +1,4 @@
-"""A mesh under reconstruction whose vertices stay on a given surface; `csm.mesh.remesh` drives it."""
+"""A mesh whose edges are split, flipped and collapsed while its vertices stay on a given surface, for remeshing."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ CORNER = 0.7
 """Boundary vertices where the boundary turns by more than acos(0.7), about 45 degrees, never move or vanish."""
 
 
-class Draft:
-    """Vertices on a surface, faces between them, and the moves that change both.
+class EditableMesh:
+    """Vertices on a surface and faces between them, with the operations that change both.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ from csm.errors import MeshError
 from csm.mesh.check import check
 from csm.mesh.correspondence import Direction, PointMap
 from csm.mesh.remesh.edge_moves import adjacency, edge_table
-from csm.mesh.remesh.editable import LONG, Draft
+from csm.mesh.remesh.editable import LONG, EditableMesh
 from csm.mesh.shape import Mesh
 from csm.mesh.surface import Surface, SurfacePoints
 
@@ -87,17 +87,17 @@ def refine(mesh: Mesh, n_vertices: int, seed: int = 0) -> Remeshed:
         raise MeshError(
             f"{mesh.name}: cannot refine {mesh.n_vertices} vertices to {n_vertices}; ask for more, or use `remesh`"
         )
-    draft = Draft(mesh, np.ones(mesh.n_vertices), mesh.n_vertices, np.random.default_rng(seed))
-    while draft.n < n_vertices:
-        longest = float(draft.relative_lengths(draft.table()).max())
-        draft.split_longest(n_vertices - draft.n, 0.8 * longest)
-        draft.flip()
-        draft.relax()
+    editable = EditableMesh(mesh, np.ones(mesh.n_vertices), mesh.n_vertices, np.random.default_rng(seed))
+    while editable.n < n_vertices:
+        longest = float(editable.relative_lengths(editable.table()).max())
+        editable.split_longest(n_vertices - editable.n, 0.8 * longest)
+        editable.flip()
+        editable.relax()
     for _ in range(5):
-        draft.relax()
-        draft.flip()
-    truth = PointMap.identity(mesh.n_vertices, draft.n, mesh.name)
-    finer = Mesh(draft.vertices, draft.faces, mesh.name, mesh.scale)
+        editable.relax()
+        editable.flip()
+    truth = PointMap.identity(mesh.n_vertices, editable.n, mesh.name)
+    finer = Mesh(editable.vertices, editable.faces, mesh.name, mesh.scale)
     location = Surface(finer).at_vertices()
     return Remeshed(finer, truth, location[: mesh.n_vertices])
 
@@ -128,48 +128,50 @@ def remesh(mesh: Mesh, n_vertices: int, seed: int = 0) -> Remeshed:
     rng = np.random.default_rng(seed)
     sizes = _graded_sizes(mesh)
     area_factor = np.sqrt(2 / np.sqrt(3) * (mesh.face_areas / sizes[mesh.faces].mean(axis=1) ** 2).sum() / n_vertices)
-    draft = Draft(mesh, sizes * area_factor, 0, rng)
-    draft.scatter(0.3)
+    editable = EditableMesh(mesh, sizes * area_factor, 0, rng)
+    editable.scatter(0.3)
     for _ in range(6):
         for _ in range(5):
-            draft.split_longest(draft.n, LONG)
+            editable.split_longest(editable.n, LONG)
         for _ in range(5):
-            draft.collapse_shortest(draft.n, 4 / 5)
-        draft.flip()
-        draft.relax()
-        draft.sizes = draft.sizes * np.sqrt(np.clip(draft.n / n_vertices, 0.9, 1.1))
-    _reach(draft, n_vertices, mesh.name)
+            editable.collapse_shortest(editable.n, 4 / 5)
+        editable.flip()
+        editable.relax()
+        editable.sizes = editable.sizes * np.sqrt(np.clip(editable.n / n_vertices, 0.9, 1.1))
+    _reach(editable, n_vertices, mesh.name)
     for _ in range(5):
-        draft.flip()
-        draft.relax()
-    draft.flip()
-    return _with_truth(mesh, draft, rng)
+        editable.flip()
+        editable.relax()
+    editable.flip()
+    return _with_truth(mesh, editable, rng)
 
 
-def _reach(draft: Draft, n_vertices: int, name: str) -> None:
+def _reach(editable: EditableMesh, n_vertices: int, name: str) -> None:
     """Split or collapse the last few edges to make the count exact."""
-    while draft.n != n_vertices:
-        missing = n_vertices - draft.n
-        ratio = draft.relative_lengths(draft.table())
+    while editable.n != n_vertices:
+        missing = n_vertices - editable.n
+        ratio = editable.relative_lengths(editable.table())
         if missing > 0:
-            done = draft.split_longest(missing, 0.85 * float(ratio.max()))
+            done = editable.split_longest(missing, 0.85 * float(ratio.max()))
         else:
-            done = draft.collapse_shortest(-missing, 1.25 * float(np.quantile(ratio, min(1.0, -missing / draft.n))))
-            done = done or draft.collapse_shortest(1, np.inf, careful=False)
+            done = editable.collapse_shortest(
+                -missing, 1.25 * float(np.quantile(ratio, min(1.0, -missing / editable.n)))
+            )
+            done = done or editable.collapse_shortest(1, np.inf, careful=False)
         if not done:
             raise MeshError(
-                f"{name}: the remeshing stops at {draft.n} vertices, {n_vertices} were wanted: no edge can be "
+                f"{name}: the remeshing stops at {editable.n} vertices, {n_vertices} were wanted: no edge can be "
                 "collapsed without changing the topology or turning a face; ask for more vertices"
             )
-        draft.flip()
+        editable.flip()
 
 
-def _with_truth(mesh: Mesh, draft: Draft, rng: np.random.Generator) -> Remeshed:
+def _with_truth(mesh: Mesh, editable: EditableMesh, rng: np.random.Generator) -> Remeshed:
     """Number the vertices and faces anew at random and look up where the old vertices are."""
-    order = rng.permutation(draft.n)
+    order = rng.permutation(editable.n)
     number = np.argsort(order)
-    new = Mesh(draft.vertices[order], number[rng.permutation(draft.faces)], mesh.name, mesh.scale)
-    start = Surface(mesh).nearest_marks(draft.place[order])
+    new = Mesh(editable.vertices[order], number[rng.permutation(editable.faces)], mesh.name, mesh.scale)
+    start = Surface(mesh).nearest_marks(editable.place[order])
     surface = Surface(new)
     location = surface.walk(mesh.vertices, surface.at_vertices().faces[start])
     truth = PointMap(location.nearest_corner(new), Direction.TEMPLATE_TO_SHAPE, new.n_vertices, mesh.name)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from scipy import sparse
@@ -13,13 +13,14 @@ from csm._types import Arrays, FloatArray
 from csm.errors import ConfigError
 from csm.operators.frames import FrameKind
 from csm.operators.operators import Operators
+from csm.operators.stencils.base import Stencil
 
 _DENSE_BELOW = 100  # rows
 _TOLERANCE = 1e-8  # of the largest eigenvalue
 
 
 @dataclass(frozen=True)
-class AnisotropicLaplacians:
+class AnisotropicLaplacians(Stencil):
     r"""One symmetric matrix per angle, with eigenvalues in [-1, 1], all of one sparsity pattern.
 
     With S the anisotropic stiffness of an angle and A the vertex areas, ACSCNN filters by polynomials of
@@ -54,11 +55,11 @@ class AnisotropicLaplacians:
     code has diagonals below zero and takes their (imaginary) square roots, which amounts to the absolute value.
     """
 
-    alpha: float = 10.0
-    angles: int = 8
-    frame: FrameKind = "line_field"
-    sweeps: int = 10
-    smoothing: float = 0.08
+    alpha: float
+    angles: int
+    frame: FrameKind
+    sweeps: int
+    smoothing: float
 
     name: ClassVar[str] = "albo"
 
@@ -76,10 +77,6 @@ class AnisotropicLaplacians:
             "indices": pattern.indices,
             "values": np.stack([scaled(stiffness.at(self.alpha, theta)).data for theta in thetas]),
         }
-
-    def parameters(self) -> dict[str, Any]:
-        """Return every parameter as plain data."""
-        return asdict(self)
 
 
 def scaled(stiffness: sparse.csr_array) -> sparse.csr_array:

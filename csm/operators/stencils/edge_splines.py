@@ -1,32 +1,19 @@
-"""Directed mesh edges in the cells of a regular grid of control points, for spline-based convolutions."""
+"""The stencil "edge_splines": spline weights of the directed edges, for spline-based convolutions."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import product
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from csm._types import Arrays, FloatArray, IntArray
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
+from csm.mesh.topology import DirectedEdges, directed_edges
 from csm.operators.operators import Operators
-
-
-class DirectedEdges(NamedTuple):
-    """Every edge in both directions, sorted by target, then source: `targets` and `sources`, shape (E,) each."""
-
-    targets: IntArray
-    sources: IntArray
-
-
-def directed_edges(mesh: Mesh) -> DirectedEdges:
-    """Return the E directed edges of a mesh, each once."""
-    tails, heads = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
-    n = mesh.n_vertices
-    keys = np.unique(np.concatenate([tails * n + heads, heads * n + tails]))
-    return DirectedEdges(keys // n, keys % n)
+from csm.operators.stencils.base import Stencil
 
 
 def pseudo_coordinates(mesh: Mesh, edges: DirectedEdges) -> FloatArray:
@@ -64,7 +51,7 @@ def linear_splines(positions: FloatArray, kernel: int) -> Corners:
 
 
 @dataclass(frozen=True)
-class EdgeSplines:
+class EdgeSplines(Stencil):
     """For every control point of a spline kernel, the sparse matrix that gathers neighbours by its basis function.
 
     With u the pseudo-coordinates of the edge from t to its neighbour s, matrix m has the entries B_m(u) at (t, s).
@@ -97,7 +84,7 @@ class EdgeSplines:
     2018; the scale of the coordinates is that of the authors' PyTorch Geometric.
     """
 
-    kernel: int = 5
+    kernel: int
 
     name: ClassVar[str] = "edge_splines"
 
@@ -108,7 +95,7 @@ class EdgeSplines:
     def __call__(self, operators: Operators) -> Arrays:
         """Return the arrays of all matrices."""
         mesh, n = operators.mesh, operators.mesh.n_vertices
-        edges = directed_edges(mesh)
+        edges = directed_edges(mesh.faces, n)
         corners = linear_splines(pseudo_coordinates(mesh, edges), self.kernel)
         edge, corner = np.nonzero(corners.weights)
         keys = corners.points[edge, corner] * n + edges.targets[edge]
@@ -122,7 +109,3 @@ class EdgeSplines:
             "offsets": np.searchsorted(rows, n * np.arange(self.kernel**3 + 1)),
             "degrees": np.bincount(edges.targets, minlength=n).astype(np.float64),
         }
-
-    def parameters(self) -> dict[str, Any]:
-        """Return every parameter as plain data."""
-        return asdict(self)

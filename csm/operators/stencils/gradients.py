@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from csm._types import Arrays, FloatArray, IntArray
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
+from csm.mesh.topology import directed_edges
 from csm.operators._edges import dot, unit
 from csm.operators.operators import Operators
+from csm.operators.stencils.base import Stencil
 
 _LONGEST = 1e-6  # edges at a vertex within this fraction of the longest are equally long
 
 
 @dataclass(frozen=True)
-class VertexGradients:
+class VertexGradients(Stencil):
     r"""The gradient of a function at every vertex, as two matrices that give its components in a tangent frame.
 
     At vertex i the gradient is the least-squares fit to the differences along the edges ij, with p_ij the edge in the
@@ -48,7 +50,7 @@ class VertexGradients:
     vertex normals weight all faces alike and whose regularisation is relative to a mesh scaled to radius 1.
     """
 
-    regularisation: float = 1e-5
+    regularisation: float
 
     name: ClassVar[str] = "gradients"
 
@@ -63,7 +65,8 @@ class VertexGradients:
         (j, i) is, for each entry (i, j).
         """
         mesh = operators.mesh
-        tail, head = _directed_edges(mesh)
+        tail, head = directed_edges(mesh.faces, mesh.n_vertices)
+        tail, head = tail[tail != head], head[tail != head]
         weights = _fit(_in_tangent_plane(mesh, tail, head), tail, mesh.n_vertices, self.regularisation)
         centre = np.stack([-np.bincount(tail, w, mesh.n_vertices) for w in weights.T], axis=1)
         vertices = np.arange(mesh.n_vertices)
@@ -76,19 +79,6 @@ class VertexGradients:
             "values": np.concatenate([weights, centre])[order].T.copy(),
             "mirror": np.lexsort((rows, columns)),
         }
-
-    def parameters(self) -> dict[str, Any]:
-        """Return every parameter as plain data."""
-        return asdict(self)
-
-
-def _directed_edges(mesh: Mesh) -> tuple[IntArray, IntArray]:
-    """Return tails and heads, (E,) each, with every edge both ways and once."""
-    a, b = mesh.faces.ravel(), mesh.faces[:, [1, 2, 0]].ravel()
-    keys = np.unique(np.concatenate([a * mesh.n_vertices + b, b * mesh.n_vertices + a]))
-    tail, head = np.divmod(keys, mesh.n_vertices)
-    distinct = tail != head
-    return tail[distinct], head[distinct]
 
 
 def _in_tangent_plane(mesh: Mesh, tail: IntArray, head: IntArray) -> FloatArray:

@@ -1,9 +1,9 @@
-"""The symmetric normalised Laplacian of a mesh, moved to [-1, 1], for convolutions that are polynomials of it."""
+"""The stencil "scaled_laplacian": the symmetric normalised Laplacian with its spectrum scaled to [-1, 1]."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar, Literal, TypeAlias, get_args
+from dataclasses import dataclass
+from typing import ClassVar, Literal, TypeAlias, get_args
 
 import numpy as np
 from scipy import sparse
@@ -12,15 +12,16 @@ from scipy.sparse.linalg import eigsh
 from csm._types import Arrays
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
+from csm.mesh.topology import directed_edges
 from csm.operators.laplacian import stiffness
 from csm.operators.operators import Operators
-from csm.operators.stencils.edge_splines import directed_edges
+from csm.operators.stencils.base import Stencil
 
 LaplacianKind: TypeAlias = Literal["graph", "cotangent"]
 
 
 @dataclass(frozen=True)
-class ScaledLaplacian:
+class ScaledLaplacian(Stencil):
     r"""2 L / lambda_max - I with  L = D^{-1/2} S D^{-1/2},  S a Laplacian of the mesh and D its diagonal.
 
     The arrays `indptr` (N + 1,), `indices` and `values` (nnz,) are the matrix as CSR; it is symmetric.
@@ -42,7 +43,7 @@ class ScaledLaplacian:
     filtering", NeurIPS 2016.
     """
 
-    laplacian: LaplacianKind = "graph"
+    laplacian: LaplacianKind
 
     name: ClassVar[str] = "scaled_laplacian"
 
@@ -65,15 +66,11 @@ class ScaledLaplacian:
             "values": matrix.data,
         }
 
-    def parameters(self) -> dict[str, Any]:
-        """Return every parameter as plain data."""
-        return asdict(self)
-
 
 def graph_laplacian(mesh: Mesh) -> sparse.csr_array:
     """Return the combinatorial Laplacian of the mesh's edges, (N, N): positive semidefinite, rows sum to zero."""
-    edges, n = directed_edges(mesh), mesh.n_vertices
-    vertices = np.arange(n)
+    n = mesh.n_vertices
+    edges, vertices = directed_edges(mesh.faces, n), np.arange(n)
     values = np.concatenate([np.bincount(edges.targets, minlength=n), np.full(len(edges.targets), -1.0)])
     rows, columns = np.concatenate([vertices, edges.targets]), np.concatenate([vertices, edges.sources])
     return sparse.csr_array(sparse.coo_array((values, (rows, columns)), shape=(n, n)))

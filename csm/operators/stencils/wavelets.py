@@ -1,9 +1,9 @@
-"""What spectral wavelets of many scales reach from every vertex: the stencil of MGCN."""
+"""The stencil "wavelets", for MGCN: spectral wavelets of many scales and the vertices that they reach."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar, NamedTuple
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -12,6 +12,7 @@ from csm._types import Arrays, BoolArray, Float32Array, FloatArray, IntArray
 from csm.errors import ConfigError
 from csm.operators.filters import mexican_hat_filters
 from csm.operators.operators import Operators
+from csm.operators.stencils.base import Stencil
 
 _NEGLIGIBLE = 1e-9  # of a filter's greatest value: float32 would not feel it, but denormal numbers are slow
 _GRAIN = 128  # that counts of vertices are rounded up to: matrix kernels are generated once for every size that occurs
@@ -19,7 +20,7 @@ _LEVELS = 160  # of size, four per octave: weights down to 2^-40 are told apart
 
 
 @dataclass(frozen=True)
-class Wavelets:
+class Wavelets(Stencil):
     r"""The sixteen wavelets of MGCN, and for patches of vertices the vertices that their fourth powers reach.
 
     With the symmetric kernel :math:`\psi_s(i, j) = \sum_m g_s(\lambda_m) \phi_m(i) \phi_m(j)` the operators of MGCN are
@@ -59,9 +60,9 @@ class Wavelets:
     published code.
     """
 
-    k: int = 300
-    n_filters: int = 32
-    tolerance: float = 1e-3
+    k: int
+    n_filters: int
+    tolerance: float
     patch: int = 100
 
     name: ClassVar[str] = "wavelets"
@@ -98,13 +99,9 @@ class Wavelets:
             "dropped": np.concatenate([r.dropped for r in reaches]),
         }
 
-    def parameters(self) -> dict[str, Any]:
-        """Return every parameter as plain data."""
-        return asdict(self)
-
 
 class Reach(NamedTuple):
-    """What a patch of R vertices reaches.
+    """The vertices that the wavelets at a patch of R vertices reach.
 
     Shapes: `columns` (Q,) vertices, `extents` (S,) how many of the first of them each wavelet uses, `dropped` (R, S)
     what this leaves out of each column's sum 1.

@@ -13,9 +13,11 @@ from csm.operators.laplacian import stiffness
 from csm.operators.stencils.anisotropic_laplacians import AnisotropicLaplacians, scaled
 from tests.shapes import blob, rotation, sphere
 
+DEFAULTS = {"alpha": 10.0, "angles": 8, "frame": "line_field", "sweeps": 10, "smoothing": 0.08}
+
 
 def matrices(mesh: Mesh, **options) -> list[np.ndarray]:
-    arrays = AnisotropicLaplacians(**options)(Operators(mesh))
+    arrays = AnisotropicLaplacians(**{**DEFAULTS, **options})(Operators(mesh))
     return [sparse.csr_array((v, arrays["indices"], arrays["indptr"])).toarray() for v in arrays["values"]]
 
 
@@ -49,7 +51,7 @@ def test_matrices_are_symmetric_with_eigenvalues_from_minus_one_to_one(options):
 
 
 def test_without_anisotropy_it_is_the_scaled_cotangent_matrix():
-    made = AnisotropicLaplacians(alpha=0.0, angles=1)(Operators(blob(2)))["values"][0]
+    made = AnisotropicLaplacians(**{**DEFAULTS, "alpha": 0.0, "angles": 1})(Operators(blob(2)))["values"][0]
     np.testing.assert_allclose(made, scaled(stiffness(blob(2))).data, atol=1e-12)
 
 
@@ -83,4 +85,4 @@ def test_a_vertex_without_stiffness_is_left_alone():
 @pytest.mark.parametrize("wrong", [{"alpha": -1.0}, {"alpha": float("nan")}, {"angles": 0}])
 def test_settings_out_of_range_are_refused(wrong):
     with pytest.raises(ConfigError, match="wanted"):
-        AnisotropicLaplacians(**wrong)
+        AnisotropicLaplacians(**{**DEFAULTS, **wrong})

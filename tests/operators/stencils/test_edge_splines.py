@@ -7,8 +7,9 @@ import pytest
 
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
+from csm.mesh.topology import directed_edges
 from csm.operators import Operators
-from csm.operators.stencils.edge_splines import EdgeSplines, directed_edges, linear_splines, pseudo_coordinates
+from csm.operators.stencils.edge_splines import EdgeSplines, linear_splines, pseudo_coordinates
 from tests.shapes import blob, cylinder, plane, rotation, sphere
 
 SHAPES = [sphere(1), cylinder(n=8, m=5), plane(6), blob(2)]
@@ -58,13 +59,13 @@ def test_the_transpose_is_the_matrix_of_the_mirrored_control_point(mesh):
 def test_matrices_share_out_the_neighbours(mesh):
     total = matrices(mesh, 4).sum(axis=0)
     np.testing.assert_allclose(total[total != 0], 1)
-    np.testing.assert_array_equal((total != 0).sum(axis=1), EdgeSplines()(Operators(mesh))["degrees"])
-    assert (total != 0).sum() == len(directed_edges(mesh).targets)
+    np.testing.assert_array_equal((total != 0).sum(axis=1), EdgeSplines(4)(Operators(mesh))["degrees"])
+    assert (total != 0).sum() == len(directed_edges(mesh.faces, mesh.n_vertices).targets)
 
 
 def test_coordinates_fill_the_unit_cube_and_mirror_on_the_way_back():
     mesh = blob(2)
-    edges = directed_edges(mesh)
+    edges = directed_edges(mesh.faces, mesh.n_vertices)
     u = pseudo_coordinates(mesh, edges)
     assert u.min() >= 0
     assert u.max() <= 1

@@ -82,7 +82,7 @@ def test_motion_changes_nothing_and_numbering_only_the_order():
 
 @pytest.mark.parametrize("mesh", [blob(2), plane(6)], ids=["closed", "with boundary"])
 def test_mirror_transposes_the_pattern(mesh):
-    arrays = VertexGradients()(Operators(mesh))
+    arrays = VertexGradients(1e-5)(Operators(mesh))
     for values in arrays["values"]:
         matrix = sparse.csr_array((values, arrays["indices"], arrays["indptr"])).toarray()
         other = sparse.csr_array((values[arrays["mirror"]], arrays["indices"], arrays["indptr"])).toarray()
