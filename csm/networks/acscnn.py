@@ -1,4 +1,4 @@
-"""ACSCNN: Chebyshev filters of anisotropic Laplacians."""
+"""ACSCNN: a network whose convolutions are Chebyshev filters of anisotropic Laplacians."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from csm.networks.base import ConvolutionalNetwork
 from csm.networks.sparse import chebyshev_filter, symmetric_matrix
 from csm.networks.surface import Surface
 
 
 class ACSConv(nn.Module):
-    r"""Sum of Chebyshev filters, one for each of the J angles of the anisotropic Laplacian.
+    r"""Convolution that sums the Chebyshev filters of the anisotropic Laplacians of J angles.
 
     .. math::
         y = b + \sum_{k=0}^{K-1} \big[ T_k(\tilde L_1)\,x \,|\, \dots \,|\, T_k(\tilde L_J)\,x \big] W_k
@@ -43,24 +44,24 @@ class ACSConv(nn.Module):
         self.reset_parameters()
 
     def reset_parameters(self) -> None:
-        """Draw the weights Xavier-uniformly as the released code does, and set the bias to zero.
+        """Draw the weights Xavier-uniformly, as the released code does, and set the bias to zero.
 
-        For a tensor of three axes PyTorch takes the fans to be (J C_in + K) C_out together.
+        For a tensor of three axes PyTorch takes the sum of fan-in and fan-out to be (J C_in + K) C_out.
         """
         nn.init.xavier_uniform_(self.weight)
         nn.init.zeros_(self.bias)
 
     def forward(self, x: Tensor, laplacians: Sequence[Tensor], root_mass: Tensor) -> Tensor:
-        """Filter the functions `x`.
+        """Return the filtered functions, shape (N, C_out).
 
         Parameters
         ----------
         x
-            Shape (N, C_in).
+            Functions, shape (N, C_in).
         laplacians
-            J sparse matrices M = A^1/2 L A^-1/2, (N, N), see `laplacians_of`.
+            The J sparse symmetric matrices M = A^1/2 L A^-1/2, shape (N, N) each, that `laplacians_of` returns.
         root_mass
-            Shape (N, 1): the diagonal of A^1/2.
+            Square roots of the vertex areas, which are the diagonal of A^1/2, shape (N, 1).
         """
         terms, _, fan_out = self.weight.shape
         weight = self.weight.view(terms, self.angles, -1, fan_out)
@@ -72,11 +73,11 @@ class ACSConv(nn.Module):
         return f"{fan_in // self.angles}, {fan_out}, terms={terms}, angles={self.angles}"
 
 
-class ACSCNN(nn.Module):
-    """Anisotropic Chebyshev spectral CNN: six ACSConv, MLP256, and a classifier over the template vertices.
+class ACSCNN(ConvolutionalNetwork):
+    """Anisotropic Chebyshev spectral CNN: six ACSConv, a linear layer of 256 channels, and the classifier.
 
-    Batch normalisation and a ReLU follow every convolution, a ReLU the 256-wide layer, whose output is the learned
-    descriptor.  The filters reach terms - 1 rings around a vertex.
+    Batch normalisation and a ReLU follow every convolution, and a ReLU follows the linear layer, whose output is the
+    learned descriptor.  The filter of one convolution reaches terms - 1 rings around a vertex.
 
     Parameters
     ----------
@@ -91,17 +92,18 @@ class ACSCNN(nn.Module):
     terms
         Number of Chebyshev polynomials per convolution, T_0 .. T_{terms-1}.
     alpha, angles
-        Strength of the anisotropy, and number of angles.
+        Strength of the anisotropy, and number J of angles.
     frame, sweeps, smoothing
-        Of `csm.operators.frames.face_frames`.  The default is the released code's frame without its dependence on the
-        world axes; "smooth" is csm's own and depends less on the resolution.
+        How the tangent frames of the faces are found, as in `csm.operators.frames.face_frames`.  The default is the
+        frame of the released code without its dependence on the world axes; "smooth" is csm's own frame, which depends
+        less on the resolution of the mesh.
     dropout
-        Between descriptor and classifier.
+        Dropout between the learned descriptor and the classifier.
 
     References
     ----------
-    Li et al., "Shape correspondence using anisotropic Chebyshev spectral CNNs", CVPR 2020; sizes as in the released
-    code.
+    Li et al., "Shape correspondence using anisotropic Chebyshev spectral CNNs", CVPR 2020; the sizes are those of
+    the released code.
     """
 
     def __init__(
@@ -123,37 +125,24 @@ class ACSCNN(nn.Module):
         self.convs = nn.ModuleList(ACSConv(a, b, terms, angles) for a, b in widths)
         self.norms = nn.ModuleList(nn.BatchNorm1d(width) for width in channels)
         self.embed = nn.Linear(channels[-1], descriptor_channels)
-        self.dropout = nn.Dropout(dropout)
-        self.classifier = nn.Linear(descriptor_channels, n_classes)
+        self.add_classifier(descriptor_channels, n_classes, dropout)
+        self.albo = {"alpha": alpha, "angles": angles, "frame": frame, "sweeps": sweeps, "smoothing": smoothing}
 
-    @staticmethod
-    def stencils(
-        alpha: float = 10.0,
-        angles: int = 8,
-        frame: str = "line_field",
-        sweeps: int = 10,
-        smoothing: float = 0.08,
-        **_: Any,
-    ) -> dict[str, dict[str, Any]]:
-        """Return the stencil of a network with these options: the anisotropic Laplacians."""
-        parameters = {"alpha": alpha, "angles": angles, "frame": frame, "sweeps": sweeps, "smoothing": smoothing}
-        return {"albo": parameters}
+    def stencils(self) -> dict[str, dict[str, Any]]:
+        """Return the stencil that the convolutions filter by: the anisotropic Laplacians, "albo"."""
+        return {"albo": dict(self.albo)}
 
-    def describe(self, x: Tensor, surface: Surface) -> Tensor:
-        """Return the learned descriptor, shape (N, descriptor_channels), of input features `x`, shape (N, P)."""
-        laplacians, root_mass = laplacians_of(surface), surface.basis.mass.sqrt()[:, None]
-        for conv, norm in zip(self.convs, self.norms, strict=True):
-            x = torch.relu(norm(conv(x, laplacians, root_mass)))
-        return torch.relu(self.embed(x))
+    def operators(self, surface: Surface, dtype: torch.dtype) -> tuple[Any, ...]:
+        """Return the anisotropic Laplacians of all angles, and the square roots of the vertex areas, shape (N, 1)."""
+        return laplacians_of(surface), surface.basis.mass.sqrt()[:, None]
 
-    def forward(self, x: Tensor, surface: Surface) -> Tensor:
-        """Return the logits over the template vertices, shape (N, n_classes)."""
-        y: Tensor = self.classifier(self.dropout(self.describe(x, surface)))
-        return y
+    def activated(self, x: Tensor, layer: int) -> Tensor:
+        """Return the output `x`, shape (N, C), of a layer after batch normalisation (of convolutions only) and ReLU."""
+        return torch.relu(self.norms[layer](x) if layer < len(self.norms) else x)
 
 
 def laplacians_of(surface: Surface) -> tuple[Tensor, ...]:
-    """Return the stencil "albo" as sparse tensors, (N, N) each and symmetric, one per angle."""
+    """Return the stencil "albo" as J sparse symmetric tensors, shape (N, N), one for each angle."""
     stencil = surface.stencil("albo")
-    indptr, indices = stencil["indptr"].int(), stencil["indices"].int()  # once for all angles
+    indptr, indices = stencil["indptr"].int(), stencil["indices"].int()  # is converted once for all angles
     return tuple(symmetric_matrix(indptr, indices, values) for values in stencil["values"])

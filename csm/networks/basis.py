@@ -1,4 +1,4 @@
-"""The truncated eigenbasis that spectral layers work in."""
+"""The truncated eigenbasis that the spectral layers compute in."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Basis(NamedTuple):
         Raises
         ------
         ValueError
-            If fewer than `k` are there.
+            If the basis has fewer than `k` eigenpairs.
         """
         if k > self.k:
             raise ValueError(
@@ -37,9 +37,9 @@ class Basis(NamedTuple):
         return Basis(self.evals[:k], self.evecs[:, :k], self.mass)
 
     def project(self, x: Tensor) -> Tensor:
-        """Analysis: spectral coefficients Phi^T A x, shape (K, C), of the functions `x`, shape (N, C)."""
+        """Return the spectral coefficients Phi^T A x, shape (K, C), of the functions `x`, shape (N, C) (analysis)."""
         return self.evecs.T @ (self.mass[:, None] * x)
 
     def synthesize(self, coefficients: Tensor) -> Tensor:
-        """Synthesis: the functions Phi c, shape (N, C), with spectral coefficients `coefficients`, shape (K, C)."""
+        """Return the functions Phi c, shape (N, C), with the spectral coefficients c, shape (K, C) (synthesis)."""
         return self.evecs @ coefficients

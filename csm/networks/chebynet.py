@@ -1,4 +1,4 @@
-"""ChebyNet: convolutions that are polynomials of the mesh's sparse Laplacian."""
+"""ChebyNet: a network whose convolutions are polynomials of the mesh's sparse Laplacian."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from collections.abc import Sequence
 from typing import Any
 
 import torch
-import torch.nn.functional as F
 from torch import Tensor, nn
 
+from csm.networks.base import ConvolutionalNetwork
 from csm.networks.csmconv import reset_terms
 from csm.networks.sparse import chebyshev_filter, symmetric_matrix
 from csm.networks.surface import Surface
 
 
-class ChebyNet(nn.Module):
-    """Six Chebyshev graph convolutions, MLP256, and a classifier over the template vertices; ELU after each.
+class ChebyNet(ConvolutionalNetwork):
+    """Six Chebyshev graph convolutions and a linear layer of 256 channels, with ELU after each, and the classifier.
 
-    A reference for locality: a convolution of K terms sees the K - 1 rings around a vertex, one of `CSMConv` the whole
-    shape.
+    It serves as a reference for locality: a convolution of K terms sees the K - 1 rings around a vertex, whereas
+    `CSMConv` sees the whole shape.
 
     Parameters
     ----------
@@ -34,13 +34,13 @@ class ChebyNet(nn.Module):
     terms
         Number K of Chebyshev polynomials per convolution, T_0 .. T_{K-1}.
     laplacian
-        "graph" or "cotangent", see `csm.operators.stencils.scaled_laplacian.ScaledLaplacian`.
+        "graph" or "cotangent", as in `csm.operators.stencils.scaled_laplacian.ScaledLaplacian`.
     dropout
-        Between descriptor and classifier.
+        Dropout between the learned descriptor and the classifier.
 
     Notes
     -----
-    The method was published for other data; widths, ELU and dropout are those of `SplineCNN`.
+    The method was published for other data than shapes; the widths, ELU and the dropout are those of `SplineCNN`.
 
     References
     ----------
@@ -60,32 +60,23 @@ class ChebyNet(nn.Module):
     ) -> None:
         super().__init__()
         if laplacian not in ("graph", "cotangent"):
-            raise ValueError(f'laplacian is "graph" or "cotangent", got {laplacian!r}')
+            raise ValueError(f'laplacian must be "graph" or "cotangent", got {laplacian!r}')
         self.convs = nn.ModuleList(ChebConv(a, b, terms) for a, b in itertools.pairwise((in_channels, *channels)))
         self.embed = nn.Linear(channels[-1], descriptor_channels)
-        self.dropout = nn.Dropout(dropout)
-        self.classifier = nn.Linear(descriptor_channels, n_classes)
+        self.add_classifier(descriptor_channels, n_classes, dropout)
+        self.laplacian = laplacian
 
-    @staticmethod
-    def stencils(laplacian: str = "graph", **_: Any) -> dict[str, dict[str, Any]]:
-        """Return the stencil that the convolutions are polynomials of."""
-        return {"scaled_laplacian": {"laplacian": laplacian}}
+    def stencils(self) -> dict[str, dict[str, Any]]:
+        """Return the stencil that the convolutions are polynomials of: the scaled Laplacian."""
+        return {"scaled_laplacian": {"laplacian": self.laplacian}}
 
-    def describe(self, x: Tensor, surface: Surface) -> Tensor:
-        """Return the learned descriptor, shape (N, descriptor_channels), of input features `x`, shape (N, P)."""
-        laplacian = laplacian_of(surface, x.dtype)
-        for conv in self.convs:
-            x = F.elu(conv(x, laplacian))
-        return F.elu(self.embed(x))
-
-    def forward(self, x: Tensor, surface: Surface) -> Tensor:
-        """Return the logits over the template vertices, shape (N, n_classes)."""
-        y: Tensor = self.classifier(self.dropout(self.describe(x, surface)))
-        return y
+    def operators(self, surface: Surface, dtype: torch.dtype) -> tuple[Any, ...]:
+        """Return the scaled Laplacian of the surface."""
+        return (laplacian_of(surface, dtype),)
 
 
 def laplacian_of(surface: Surface, dtype: torch.dtype) -> Tensor:
-    """Return the stencil "scaled_laplacian" as a sparse tensor, (N, N) and symmetric."""
+    """Return the stencil "scaled_laplacian" as a sparse symmetric tensor, shape (N, N)."""
     stencil = surface.stencil("scaled_laplacian")
     return symmetric_matrix(stencil["indptr"], stencil["indices"], stencil["values"].to(dtype))
 
@@ -98,7 +89,7 @@ class ChebConv(nn.Module):
     in_channels, out_channels
         Channels C_in of the input and C_out of the output functions.
     terms
-        K, at least 1.
+        Number K of Chebyshev polynomials, at least 1.
 
     Shapes
     ------
@@ -118,7 +109,7 @@ class ChebConv(nn.Module):
         reset_terms(self.weight, self.bias)
 
     def forward(self, x: Tensor, laplacian: Tensor) -> Tensor:
-        """Convolve the functions `x`, shape (N, C_in), with the matrix of `laplacian_of`."""
+        """Convolve the functions `x`, shape (N, C_in), by the matrix that `laplacian_of` returns."""
         return chebyshev_filter(x, self.weight[:, None], (laplacian,)) + self.bias
 
     def extra_repr(self) -> str:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import torch
 from torch import Tensor, nn
 
+from csm.networks.base import ConvolutionalNetwork
 from csm.networks.csmconv import BiasDomain, CSMConv
 from csm.networks.surface import Surface
 
@@ -23,10 +24,10 @@ ACTIVATIONS: dict[str, type[nn.Module]] = {
 }
 
 
-class CSMCNN(nn.Module):
-    """Chebyshev spectral manifold network: MLP64, three CSMConv, MLP256, and a classifier over the template vertices.
+class CSMCNN(ConvolutionalNetwork):
+    """Chebyshev spectral manifold network: a linear layer, three CSMConv, a second linear layer, and the classifier.
 
-    The learned descriptor is the output of the 256-wide layer; the classifier only serves the training and is not
+    The learned descriptor is the output of the second linear layer; the classifier only serves the training and is not
     needed to match shapes.
 
     Parameters
@@ -44,21 +45,21 @@ class CSMCNN(nn.Module):
     terms
         Number of Chebyshev polynomials per convolution, T_0 .. T_{terms-1}.
     normalisation
-        "batch" (running statistics at test time), "instance" (each shape's own statistics, at training and at test
-        time) or "none", after every layer.
+        What every layer is followed by before its activation: "batch" (with running statistics at test time),
+        "instance" (with each shape's own statistics, in training and at test time) or "none".
     momentum, eps
-        Of the batch normalisation, in PyTorch's sense.
+        Options of the batch normalisation, in PyTorch's sense; the instance normalisation has the same `eps`.
     dropout
-        Between descriptor and classifier.
+        Dropout between the learned descriptor and the classifier.
     activation
-        "relu", "elu", "leaky_relu" or "gelu", after every layer.
+        What every layer ends with: "relu", "elu", "leaky_relu" or "gelu".
     bias
-        Where the convolutions add their bias, see `CSMConv`.
+        Where the convolutions add their bias, "spatial" or "spectral", as in `CSMConv`.
 
     Notes
     -----
-    The paper's text names neither the normalisation, the activation nor the number of terms; the defaults are those of
-    the released code, except that the batch normalisation's momentum is PyTorch's.
+    The text of the paper names neither the normalisation, nor the activation, nor the number of terms.  The defaults
+    are those of the released code, except that the batch normalisation's momentum and eps are PyTorch's.
     """
 
     def __init__(
@@ -84,30 +85,50 @@ class CSMCNN(nn.Module):
         self.finish = nn.ModuleList(
             finishing(width, normalisation, activation, momentum, eps) for width in (*channels, descriptor_channels)
         )
-        self.dropout = nn.Dropout(dropout)
-        self.classifier = nn.Linear(descriptor_channels, n_classes)
+        self.add_classifier(descriptor_channels, n_classes, dropout)
 
-    def describe(self, x: Tensor, surface: Surface) -> Tensor:
-        """Return the learned descriptor, shape (N, descriptor_channels), of input features `x`, shape (N, P)."""
-        basis = surface.basis.first(self.ks)
-        x = self.finish[0](self.lift(x))
-        for conv, finish in zip(self.convs, self.finish[1:-1], strict=True):
-            x = finish(conv(x, basis))
-        y: Tensor = self.finish[-1](self.embed(x))
+    @property
+    def n_eigenpairs(self) -> int:
+        """Number K_s of eigenpairs that the convolutions use."""
+        return self.ks
+
+    def operators(self, surface: Surface, dtype: torch.dtype) -> tuple[Any, ...]:
+        """Return the basis of the K_s lowest eigenpairs."""
+        return (surface.basis.first(self.ks),)
+
+    def lifted(self, x: Tensor) -> Tensor:
+        """Return the first linear layer's output, shape (N, channels[0]), of the input descriptor, shape (N, P)."""
+        y: Tensor = self.finish[0](self.lift(x))
+        return y
+
+    def activated(self, x: Tensor, layer: int) -> Tensor:
+        """Return the output `x`, shape (N, C), of a layer after its normalisation and activation."""
+        y: Tensor = self.finish[layer + 1](x)
         return y
 
     def filters(self, evals: Tensor) -> dict[str, Tensor]:
-        """Return the learned filters of each convolution at the eigenvalues, name -> (K_s, C_in, C_out)."""
-        return {f"conv{i}": conv.filters(evals[: self.ks]) for i, conv in enumerate(self.convs, 1)}  # type: ignore[operator]
+        """Return the learned filters of each convolution, "conv1" and on, at the first K_s of the eigenvalues.
 
-    def forward(self, x: Tensor, surface: Surface) -> Tensor:
-        """Return the logits over the template vertices, shape (N, n_classes)."""
-        y: Tensor = self.classifier(self.dropout(self.describe(x, surface)))
-        return y
+        Parameters
+        ----------
+        evals
+            Eigenvalues, shape (K,), ascending, with K of at least K_s.
+
+        Returns
+        -------
+        dict[str, Tensor]
+            From the name of a convolution to its filters, shape (K_s, C_in, C_out).
+        """
+        return {f"conv{i}": conv.filters(evals[: self.ks]) for i, conv in enumerate(self.convs, 1)}  # type: ignore[operator]
 
 
 class VertexNorm(nn.Module):
-    """Normalise each channel by its mean and variance over the vertices of the shape, then scale and shift."""
+    """Normalise each channel by its mean and variance over the vertices of the shape, then scale and shift it.
+
+    Shapes
+    ------
+    input and output (N, C); weight and bias (C,).
+    """
 
     def __init__(self, channels: int, eps: float) -> None:
         super().__init__()
@@ -116,7 +137,7 @@ class VertexNorm(nn.Module):
         self.bias = nn.Parameter(torch.zeros(channels))
 
     def forward(self, x: Tensor) -> Tensor:
-        """Normalise `x`, shape (N, C), along its first axis."""
+        """Return the functions `x`, shape (N, C), normalised over the N vertices."""
         centred = x - x.mean(0)
         y: Tensor = centred * (centred.square().mean(0) + self.eps).rsqrt() * self.weight + self.bias
         return y
@@ -125,7 +146,7 @@ class VertexNorm(nn.Module):
 def finishing(
     width: int, normalisation: Normalisation, activation: Activation, momentum: float, eps: float
 ) -> nn.Sequential:
-    """Return what comes after a layer of this width: its normalisation, if any, and its activation.
+    """Return what follows a layer of this width: its normalisation, if it has one, and its activation.
 
     Raises
     ------
@@ -133,9 +154,9 @@ def finishing(
         If the normalisation or the activation is unknown.
     """
     if activation not in ACTIVATIONS:
-        raise ValueError(f"activation is one of {', '.join(ACTIVATIONS)}, got {activation!r}")
+        raise ValueError(f"activation must be one of {', '.join(ACTIVATIONS)}, got {activation!r}")
     if normalisation not in get_args(Normalisation):
-        raise ValueError(f'normalisation is "batch", "instance" or "none", got {normalisation!r}')
+        raise ValueError(f'normalisation must be "batch", "instance" or "none", got {normalisation!r}')
     layers: list[nn.Module] = [ACTIVATIONS[activation]()]
     if normalisation == "batch":
         layers.insert(0, nn.BatchNorm1d(width, eps=eps, momentum=momentum))

@@ -19,9 +19,9 @@ def chebyshev(x: Tensor, terms: int) -> Tensor:
     Parameters
     ----------
     x
-        Shape (K,), in [-1, 1].
+        Where the polynomials are evaluated, shape (K,), in [-1, 1].
     terms
-        How many polynomials, at least 1.
+        Number of polynomials, at least 1.
 
     Returns
     -------
@@ -35,7 +35,7 @@ def chebyshev(x: Tensor, terms: int) -> Tensor:
 
 
 def reset_terms(weight: Tensor, bias: Tensor) -> None:
-    """Draw a weight, shape (D, C_in, C_out), Xavier-uniformly with the fan of all terms together; set the bias to 0."""
+    """Draw a weight, shape (D, C_in, C_out), Xavier-uniformly with the fan of all D terms together; zero the bias."""
     terms, fan_in, fan_out = weight.shape
     bound = math.sqrt(6.0 / (terms * (fan_in + fan_out)))
     nn.init.uniform_(weight, -bound, bound)
@@ -49,7 +49,7 @@ class CSMConv(nn.Module):
         y = \Phi \Big( \sum_{d=0}^{D-1} T_d(\tilde\Lambda)\,(\Phi^\top A\,x)\,W_d \Big) + b,
         \qquad \tilde\Lambda = 2 \Lambda / \lambda_K - I
 
-    The bias is added in space. The authors' released code adds it to the spectral coefficients instead, where it
+    The bias is added in space.  The authors' released code adds it to the spectral coefficients instead, where it
     contributes :math:`b \sum_k \phi_k(x)`, which changes with the arbitrary sign of every eigenvector;
     ``bias="spectral"`` reproduces that.
 
@@ -72,7 +72,7 @@ class CSMConv(nn.Module):
         if terms < 1:
             raise ValueError(f"CSMConv needs at least one Chebyshev term, got {terms}")
         if bias not in ("spatial", "spectral"):
-            raise ValueError(f'bias is "spatial" or "spectral", got {bias!r}')
+            raise ValueError(f'bias must be "spatial" or "spectral", got {bias!r}')
         self.bias_domain: BiasDomain = bias
         self.weight = nn.Parameter(torch.empty(terms, in_channels, out_channels))
         self.bias = nn.Parameter(torch.zeros(out_channels))
@@ -88,7 +88,7 @@ class CSMConv(nn.Module):
         return torch.einsum("dk,dio->kio", polynomials, self.weight)
 
     def forward(self, x: Tensor, basis: Basis) -> Tensor:
-        """Convolve the functions `x`, shape (N, C_in), on the shape with the given basis."""
+        """Return the functions `x`, shape (N, C_in), convolved on the shape with this basis, shape (N, C_out)."""
         polynomials = chebyshev(2 * basis.evals / basis.evals[-1] - 1, len(self.weight))
         coefficients = basis.project(x)
         terms = polynomials.T[:, :, None] * coefficients[:, None, :]

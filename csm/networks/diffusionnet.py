@@ -1,4 +1,4 @@
-"""DiffusionNet: diffusion for a learned time, gradients, and perceptrons at the vertices."""
+"""DiffusionNet: a network of diffusion for learned times, gradients, and a perceptron at every vertex."""
 
 from __future__ import annotations
 
@@ -7,19 +7,20 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from csm.networks.base import CorrespondenceNetwork
 from csm.networks.basis import Basis
 from csm.networks.sparse import Csr, spmm
 from csm.networks.surface import Surface
 
 LEAST_TIME = 1e-8
-"""Least diffusion time, in units of area."""
+"""Least time of diffusion, in units of area."""
 
 
 class Diffusion(nn.Module):
-    r"""Heat flow on the shape, with a learned time per channel: y = Phi exp(-Lambda t) Phi^T A x.
+    r"""Heat flow on the shape, for a learned time t of each channel: y = Phi exp(-Lambda t) Phi^T A x.
 
-    Times start at zero and are set to at least `LEAST_TIME` before every use.  Only the part of the input in the span
-    of the eigenbasis passes.
+    The times start at zero and are raised to at least `LEAST_TIME` before every use.  The part of the input that is
+    not in the span of the eigenbasis is lost.
 
     Shapes
     ------
@@ -38,17 +39,17 @@ class Diffusion(nn.Module):
 
 
 class GradientFeatures(nn.Module):
-    r"""Products of gradients, with g = g_x + i g_y the gradients of all channels at a vertex.
+    r"""Products of the gradients of all channels at a vertex, which are complex numbers g = g_x + i g_y.
 
     .. math::
         y = \tanh\,\mathrm{Re}\,\big(\bar g \odot B g\big), \qquad B = B_{re} + i B_{im}
 
-    Turning the tangent frame of a vertex changes nothing; a mirror image has the opposite sign in front of B_im, which
-    is how the network tells left from right.
+    Turning the tangent frame of a vertex changes nothing.  In a mirror image the sign in front of B_im is the opposite,
+    which is how the network tells left from right.
 
     Shapes
     ------
-    input two times (N, C), output (N, C); weights of `real` and `imaginary` (C, C).
+    two inputs (N, C), output (N, C); weights of `real` and `imaginary` (C, C).
     """
 
     def __init__(self, channels: int) -> None:
@@ -57,14 +58,19 @@ class GradientFeatures(nn.Module):
         self.imaginary = nn.Linear(channels, channels, bias=False)
 
     def forward(self, gx: Tensor, gy: Tensor) -> Tensor:
-        """Return the features, shape (N, C), of gradients with these components, shape (N, C) each."""
+        """Return the features, shape (N, C), of the gradients with the components `gx` and `gy`, shape (N, C) each."""
         along = self.real(gx) - self.imaginary(gy)
         across = self.real(gy) + self.imaginary(gx)
         return torch.tanh(gx * along + gy * across)
 
 
 class DiffusionBlock(nn.Module):
-    """Diffusion, gradients of its result, and a perceptron on input, diffused input and gradient features, added on."""
+    """Add to the input what a perceptron makes of it, of its diffusion, and of the gradient features of that.
+
+    Shapes
+    ------
+    input and output (N, C).
+    """
 
     def __init__(self, channels: int, dropout: float) -> None:
         super().__init__()
@@ -88,8 +94,8 @@ class DiffusionBlock(nn.Module):
         return y
 
 
-class DiffusionNet(nn.Module):
-    """A linear layer, four blocks of diffusion, gradients and perceptron, and a classifier over the template vertices.
+class DiffusionNet(CorrespondenceNetwork):
+    """A linear layer, four blocks of diffusion, gradients and perceptron, and the classifier.
 
     The learned descriptor is what the classifier reads: the last block's output, or a linear map of it if
     `descriptor_channels` is given.
@@ -107,18 +113,19 @@ class DiffusionNet(nn.Module):
     ks
         Number of eigenpairs that the diffusion uses.
     descriptor_channels
-        Width of the learned descriptor; None for that of the blocks, without a layer in between, as published.
+        Width of the learned descriptor.  None means that the output of the last block is the learned descriptor, as
+        published, without a linear layer in between.
     regularisation
-        Of the gradients, see `csm.operators.stencils.gradients.VertexGradients`.
+        Regularisation of the gradients, as in `csm.operators.stencils.gradients.VertexGradients`.
     block_dropout
-        Inside the perceptron of every block.
+        Dropout inside the perceptron of every block.
     dropout
-        Between descriptor and classifier; the published network has none.
+        Dropout between the learned descriptor and the classifier; the published network has none.
 
     References
     ----------
-    Sharp et al., "DiffusionNet: discretization agnostic learning on surfaces", TOG 2022; layers as in the released
-    code.
+    Sharp et al., "DiffusionNet: discretization agnostic learning on surfaces", TOG 2022; the layers are those of the
+    released code.
     """
 
     def __init__(
@@ -138,16 +145,20 @@ class DiffusionNet(nn.Module):
         self.lift = nn.Linear(in_channels, width)
         self.blocks = nn.ModuleList(DiffusionBlock(width, block_dropout) for _ in range(blocks))
         self.embed = nn.Identity() if descriptor_channels is None else nn.Linear(width, descriptor_channels)
-        self.dropout = nn.Dropout(dropout)
-        self.classifier = nn.Linear(descriptor_channels or width, n_classes)
+        self.add_classifier(descriptor_channels or width, n_classes, dropout)
+        self.regularisation = regularisation
 
-    @staticmethod
-    def stencils(regularisation: float = 1e-5, **_: Any) -> dict[str, dict[str, Any]]:
-        """Return the stencil of a network with these options: the gradients."""
-        return {"gradients": {"regularisation": regularisation}}
+    @property
+    def n_eigenpairs(self) -> int:
+        """Number of eigenpairs that the diffusion uses."""
+        return self.ks
+
+    def stencils(self) -> dict[str, dict[str, Any]]:
+        """Return the stencil that the blocks differentiate with: the gradients."""
+        return {"gradients": {"regularisation": self.regularisation}}
 
     def describe(self, x: Tensor, surface: Surface) -> Tensor:
-        """Return the learned descriptor, shape (N, descriptor_channels), of input features `x`, shape (N, P)."""
+        """Return the learned descriptor, shape (N, Q), of the input descriptor `x`, shape (N, P)."""
         basis, gradient = surface.basis.first(self.ks), Gradient(surface)
         x = self.lift(x)
         for block in self.blocks:
@@ -155,14 +166,9 @@ class DiffusionNet(nn.Module):
         y: Tensor = self.embed(x)
         return y
 
-    def forward(self, x: Tensor, surface: Surface) -> Tensor:
-        """Return the logits over the template vertices, shape (N, n_classes)."""
-        y: Tensor = self.classifier(self.dropout(self.describe(x, surface)))
-        return y
-
 
 class Gradient:
-    """The stencil "gradients", called on functions, shape (N, C), to get both components of their gradients."""
+    """The stencil "gradients" of a surface as a map from functions to both components of their gradients."""
 
     def __init__(self, surface: Surface) -> None:
         stencil = surface.stencil("gradients")
@@ -171,6 +177,6 @@ class Gradient:
         self.transposed = [Csr(indptr, indices, values[mirror]) for values in stencil["values"]]
 
     def __call__(self, x: Tensor) -> tuple[Tensor, Tensor]:
-        """Return the components, shape (N, C) each."""
+        """Return the components, shape (N, C) each, of the gradients of the functions `x`, shape (N, C)."""
         gx, gy = (spmm(matrix, x, back) for matrix, back in zip(self.components, self.transposed, strict=True))
         return gx, gy

@@ -1,17 +1,18 @@
-"""The input descriptor as it is: what a learned descriptor is compared with."""
+"""Identity: the input descriptor as it is, for comparison with learned descriptors."""
 
 from __future__ import annotations
 
-from torch import Tensor, nn
+from torch import Tensor
 
+from csm.networks.base import CorrespondenceNetwork
 from csm.networks.surface import Surface
 
 
-class Identity(nn.Module):
-    """Hand the input descriptor on.
+class Identity(CorrespondenceNetwork):
+    """A network whose learned descriptor is the input descriptor itself.
 
-    Its classifier can be trained, which makes a linear probe of the descriptor; matching by the nearest descriptor
-    needs no training, so rows of experiments set ``trainer.max_epochs=0``.
+    Training fits the classifier alone, which then tells what can be read from the input descriptor linearly.  Matching
+    by the nearest descriptor needs no training, so experiments with this network set ``trainer.max_epochs=0``.
 
     Parameters
     ----------
@@ -20,19 +21,13 @@ class Identity(nn.Module):
     n_classes
         Number of template vertices.
     dropout
-        Between descriptor and classifier.
+        Dropout between the learned descriptor and the classifier.
     """
 
     def __init__(self, in_channels: int, n_classes: int, dropout: float = 0.0) -> None:
         super().__init__()
-        self.dropout = nn.Dropout(dropout)
-        self.classifier = nn.Linear(in_channels, n_classes)
+        self.add_classifier(in_channels, n_classes, dropout)
 
     def describe(self, x: Tensor, surface: Surface) -> Tensor:
-        """Return the features `x`, (N, P), themselves."""
+        """Return the input descriptor `x`, shape (N, P), itself."""
         return x
-
-    def forward(self, x: Tensor, surface: Surface) -> Tensor:
-        """Return the logits over the template vertices, shape (N, n_classes)."""
-        y: Tensor = self.classifier(self.dropout(x))
-        return y

@@ -1,4 +1,4 @@
-"""MGCN: convolutions with wavelets of many scales."""
+"""MGCN: a network whose convolutions average with wavelets of many scales."""
 
 from __future__ import annotations
 
@@ -6,36 +6,40 @@ import itertools
 from collections.abc import Sequence
 from typing import Any
 
-from torch import Tensor, nn
-from torch.nn.functional import elu
+import torch
+from torch import nn
 
+from csm.networks.base import ConvolutionalNetwork
 from csm.networks.mgconv import MGConv, Products, WaveletOperators
 from csm.networks.surface import Surface
 
 
-class MGCN(nn.Module):
-    """Multiscale graph convolutional network: six MGConv, MLP256, and a classifier over the template vertices.
+class MGCN(ConvolutionalNetwork):
+    """Multiscale graph convolutional network: six MGConv, a linear layer of 256 channels, and the classifier.
+
+    ELU follows every layer.
 
     Parameters
     ----------
     in_channels
-        Width P of the input descriptor, WEDS in the original.
+        Width P of the input descriptor, which is WEDS in the original.
     n_classes
         Number of template vertices.
     channels
-        Widths of the convolutions.
+        Width of each convolution.
     descriptor_channels
         Width of the learned descriptor.
     ks
-        Number of eigenpairs that are not constant, of which the wavelets are made.
+        Number of eigenpairs, without the constant one, that the wavelets are made of.  The stencil brings them, so the
+        basis of the surface need not have as many.
     filters
-        Size of the bank of filters; every second one, without the low-pass, is a wavelet.
+        Size of the bank of filters; every second one of them, without the low-pass filter, is a wavelet.
     tolerance
-        What the sparse wavelets may lose of their sum, see `csm.operators.stencils.wavelets.Wavelets`; 0 is exact.
+        What the sparse wavelets may lose of their sum, as in `csm.operators.stencils.wavelets.Wavelets`; 0 is exact.
     products
-        Precision of the sums over vertices, see `WaveletOperators`.
+        Precision of the sums over vertices, "float32" or "bfloat16", as in `WaveletOperators`.
     dropout
-        Between descriptor and classifier.
+        Dropout between the learned descriptor and the classifier.
 
     References
     ----------
@@ -57,28 +61,18 @@ class MGCN(nn.Module):
     ) -> None:
         super().__init__()
         if products not in ("float32", "bfloat16"):
-            raise ValueError(f'products is "float32" or "bfloat16", got {products!r}')
+            raise ValueError(f'products must be "float32" or "bfloat16", got {products!r}')
         self.products: Products = products
         widths = itertools.pairwise((in_channels, *channels))
         self.convs = nn.ModuleList(MGConv(a, b, wavelets=filters // 2) for a, b in widths)
         self.embed = nn.Linear(channels[-1], descriptor_channels)
-        self.dropout = nn.Dropout(dropout)
-        self.classifier = nn.Linear(descriptor_channels, n_classes)
+        self.add_classifier(descriptor_channels, n_classes, dropout)
+        self.wavelets = {"k": ks, "n_filters": filters, "tolerance": tolerance}
 
-    @staticmethod
-    def stencils(ks: int = 300, filters: int = 32, tolerance: float = 1e-3, **_: Any) -> dict[str, dict[str, Any]]:
-        """Return what the network wants to know of a shape: the wavelets."""
-        return {"wavelets": {"k": ks, "n_filters": filters, "tolerance": tolerance}}
+    def stencils(self) -> dict[str, dict[str, Any]]:
+        """Return the stencil that the convolutions average with: the wavelets."""
+        return {"wavelets": dict(self.wavelets)}
 
-    def describe(self, x: Tensor, surface: Surface) -> Tensor:
-        """Return the learned descriptor, shape (N, descriptor_channels), of input features `x`, shape (N, P)."""
-        operators = WaveletOperators(surface.stencil("wavelets"), x.dtype, self.products)
-        for conv in self.convs:
-            x = elu(conv(x, operators))
-        y: Tensor = elu(self.embed(x))
-        return y
-
-    def forward(self, x: Tensor, surface: Surface) -> Tensor:
-        """Return the logits over the template vertices, shape (N, n_classes)."""
-        y: Tensor = self.classifier(self.dropout(self.describe(x, surface)))
-        return y
+    def operators(self, surface: Surface, dtype: torch.dtype) -> tuple[Any, ...]:
+        """Return the wavelets of the surface as operators on functions of the given dtype."""
+        return (WaveletOperators(surface.stencil("wavelets"), dtype, self.products),)

@@ -1,4 +1,4 @@
-"""The multiscale convolution of MGCN, without its N x N operators."""
+"""The multiscale convolution of MGCN, computed without storing its N x N operators."""
 
 from __future__ import annotations
 
@@ -14,14 +14,16 @@ from torch.autograd.function import once_differentiable
 Products = Literal["float32", "bfloat16"]
 
 HELD_BYTES = 3e9
-"""Blocks up to this size are held from layer to layer; of greater ones each is made again whenever it is needed."""
+"""Blocks of up to this total size are kept in memory for all layers; greater ones are made anew for every product."""
 
 
 class Patch(NamedTuple):
-    """A patch of vertices, those that its wavelets reach, and per wavelet the kernel's fourth powers between them.
+    """A patch of vertices, the vertices that its wavelets reach, and the weights of these in the wavelets' averages.
 
-    Shapes: `rows` (R,), `columns` (Q,), of each power (R, Q_s) for the first Q_s columns; `scales` (R, S) make their
-    weights in an average, and `dropped` (R, S) is what is left to the mean of all vertices.
+    Shapes: `rows` (R,) are the vertices of the patch, and `columns` (C,) those that they reach.  For each of the S
+    wavelets, `powers` has the fourth powers of the kernel between the rows and the first C_s columns, (R, C_s).
+    Multiplied with `scales` (R, S) these are the weights in an average, and `dropped` (R, S) is the weight that is left
+    to the mean over all vertices.
     """
 
     rows: Tensor
@@ -39,15 +41,15 @@ class WaveletOperators:
     stencil
         The tensors of the stencil "wavelets".
     dtype
-        Of the functions that the operators are applied to.
+        Type of the functions that the operators are applied to.
     products
-        "float32" multiplies in the functions' own precision; "bfloat16" rounds kernel and functions to eight bits,
-        which processors with matrix units for that are several times faster at.
+        "float32" multiplies in the precision of the functions.  "bfloat16" rounds kernel and functions to eight
+        significant bits, which is several times faster on processors with matrix units for it.
     """
 
     def __init__(self, stencil: Mapping[str, Tensor], dtype: torch.dtype, products: Products = "float32") -> None:
         self._evecs, self._responses = stencil["evecs"].to(dtype), stencil["responses"].to(dtype)
-        self._used = [int(response.count_nonzero()) for response in self._responses.T]  # they end in zeros
+        self._used = [int(response.count_nonzero()) for response in self._responses.T]  # the rest are zeros
         self._rows, self._columns = _split(stencil, "row"), _split(stencil, "column")
         self._dropped = torch.split(stencil["dropped"].to(dtype), [len(rows) for rows in self._rows])
         self._extents: list[list[int]] = stencil["extents"].tolist()
@@ -61,12 +63,12 @@ class WaveletOperators:
 
     @property
     def n_bytes(self) -> int:
-        """Size of all blocks."""
+        """Size of the blocks of all patches, in bytes."""
         entries = sum(len(rows) * sum(extents) for rows, extents in zip(self._rows, self._extents, strict=True))
         return entries * self.dtype.itemsize
 
     def __iter__(self) -> Iterator[Patch]:
-        """Go through the patches."""
+        """Iterate over the patches."""
         return self._make() if self._held is None else iter(self._held)
 
     def _make(self) -> Iterator[Patch]:
@@ -80,20 +82,20 @@ class WaveletOperators:
     def _powers(self, s: int, near: Tensor, far: Tensor) -> Tensor:
         used = self._used[s]
         squares = ((near[:, :used] * self._responses[:used, s]) @ far[:, :used].T).square_()
-        torch.threshold_(squares, 1e-15, 0.0)  # rounding, and denormal when squared, which is slow
+        torch.threshold_(squares, 1e-15, 0.0)  # only rounding errors, whose squares would be slow denormal numbers
         return squares.square_().to(self.dtype)
 
     def averages(self, x: Tensor) -> Tensor:
-        """Return G_s^T x, shape (N, S, C), of the functions `x`, shape (N, C): averages that a wavelet weights.
+        """Return G_s^T x, shape (N, S, C): the averages of the functions `x`, shape (N, C), weighted by each wavelet.
 
-        For what the stencil dropped of the weights, the mean of all vertices is taken.
+        The weight that the stencil dropped is given to the mean over all vertices.
         """
         y: Tensor = _Averages.apply(x, self)  # type: ignore[no-untyped-call]
         return y
 
 
 class _Averages(torch.autograd.Function):
-    """`WaveletOperators.averages`, whose gradient goes back through the same blocks."""
+    """`WaveletOperators.averages`, whose backward pass multiplies with the same blocks."""
 
     @staticmethod
     def forward(ctx: Any, x: Tensor, operators: WaveletOperators) -> Tensor:
@@ -117,7 +119,7 @@ class _Averages(torch.autograd.Function):
             to_mean += (arriving * patch.dropped[:, :, None]).sum((0, 1))
             scaled = (arriving * patch.scales[:, :, None]).transpose(0, 1).to(operators.dtype).contiguous()
             seen = grad.new_zeros(len(patch.columns), grad.shape[2])
-            buffer = torch.empty_like(seen, dtype=operators.dtype)  # fresh memory for every product is slow
+            buffer = torch.empty_like(seen, dtype=operators.dtype)  # allocating memory for every product would be slow
             for power, part in zip(patch.powers, scaled, strict=True):
                 n = power.shape[1]
                 seen[:n] += torch.mm(power.T, part, out=buffer[:n])
@@ -131,7 +133,7 @@ class MGConv(nn.Module):
     .. math:: y = \hat x W_0 + \sum_{s=1}^{S} G_s^\top \hat x \, W_s, \qquad
               \hat x = \frac{x - \min x}{\max x - \min x} \text{ per channel and shape}
 
-    without bias (a channel that is constant becomes 0).
+    without bias.  A channel that is constant on the shape becomes 0.
 
     Parameters
     ----------
@@ -156,7 +158,7 @@ class MGConv(nn.Module):
         nn.init.uniform_(self.weight, -bound, bound)
 
     def forward(self, x: Tensor, operators: WaveletOperators) -> Tensor:
-        """Convolve the functions `x`, shape (N, C_in)."""
+        """Return the functions `x`, shape (N, C_in), convolved with these operators, shape (N, C_out)."""
         x = unit_range(x)
         return x @ self.weight[0] + operators.averages(x).flatten(1) @ self.weight[1:].flatten(0, 1)
 
@@ -167,13 +169,13 @@ class MGConv(nn.Module):
 
 
 def unit_range(x: Tensor) -> Tensor:
-    """Shift and scale each column of `x`, shape (N, C), to run from 0 to 1; constant columns become 0."""
+    """Return `x`, shape (N, C), with each column brought to the range from 0 to 1; constant columns become 0."""
     least, most = x.amin(0), x.amax(0)
     width = most - least
     return (x - least) / torch.where(width > 0, width, torch.ones_like(width))
 
 
 def _split(stencil: Mapping[str, Tensor], kind: str) -> list[Tensor]:
-    """Cut the list of rows or columns into those of the patches."""
+    """Return the rows or columns, whichever `kind` says, of each patch."""
     ends = stencil[f"{kind}_ends"].tolist()
     return [stencil[f"{kind}s"][a:b] for a, b in itertools.pairwise([0, *ends])]

@@ -1,4 +1,4 @@
-"""A perceptron on every vertex by itself: what the input descriptor is worth without a neighbourhood."""
+"""MLP: a perceptron at every vertex, which shows what the input descriptor is worth without a neighbourhood."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from collections.abc import Sequence
 
 from torch import Tensor, nn
 
+from csm.networks.base import CorrespondenceNetwork
 from csm.networks.csmcnn import Activation, Normalisation, finishing
 from csm.networks.surface import Surface
 
 
-class MLP(nn.Module):
-    """Linear layers, each with normalisation and activation, and a classifier over the template vertices.
+class MLP(CorrespondenceNetwork):
+    """Linear layers, each followed by a normalisation and an activation, and the classifier.
 
     Parameters
     ----------
@@ -21,12 +22,12 @@ class MLP(nn.Module):
     n_classes
         Number of template vertices.
     widths
-        Of the layers; the last one's output is the learned descriptor.  The default is `CSMCNN` without its
+        Width of each layer; the output of the last one is the learned descriptor.  The default is `CSMCNN` without its
         convolutions.
     normalisation, momentum, eps, activation
-        As of `CSMCNN`, after every layer.
+        What every layer is followed by, as in `CSMCNN`.
     dropout
-        Between descriptor and classifier.
+        Dropout between the learned descriptor and the classifier.
     """
 
     def __init__(
@@ -45,15 +46,9 @@ class MLP(nn.Module):
         for before, width in itertools.pairwise((in_channels, *widths)):
             layers += [nn.Linear(before, width), finishing(width, normalisation, activation, momentum, eps)]
         self.layers = nn.Sequential(*layers)
-        self.dropout = nn.Dropout(dropout)
-        self.classifier = nn.Linear(widths[-1], n_classes)
+        self.add_classifier(widths[-1], n_classes, dropout)
 
     def describe(self, x: Tensor, surface: Surface) -> Tensor:
-        """Return the learned descriptor, (N, widths[-1]), of features `x`, (N, P); the surface plays no part."""
+        """Return the learned descriptor, shape (N, Q), of the input `x`, shape (N, P); the surface is not used."""
         y: Tensor = self.layers(x)
-        return y
-
-    def forward(self, x: Tensor, surface: Surface) -> Tensor:
-        """Return the logits over the template vertices, shape (N, n_classes)."""
-        y: Tensor = self.classifier(self.dropout(self.describe(x, surface)))
         return y

@@ -1,4 +1,4 @@
-"""SplineCNN: convolutions whose kernels are splines over the vector to a neighbour."""
+"""SplineCNN: a network whose convolutions weight a neighbour by a spline over the vector to it."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Literal, NamedTuple, get_args
 
 import torch
-import torch.nn.functional as F
 from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 
+from csm.networks.base import ConvolutionalNetwork
 from csm.networks.sparse import Csr
 from csm.networks.surface import Surface
 
 Aggregate = Literal["sum", "mean"]
 
 
-class SplineCNN(nn.Module):
-    """Six spline convolutions, MLP256, and a classifier over the template vertices; ELU after each but the last.
+class SplineCNN(ConvolutionalNetwork):
+    """Six spline convolutions and a linear layer of 256 channels, with ELU after each, and the classifier.
 
     Parameters
     ----------
     in_channels
-        Width P of the input features; the authors use a constant.
+        Width P of the input descriptor, which is a constant in the original.
     n_classes
         Number of template vertices.
     channels
@@ -32,15 +32,17 @@ class SplineCNN(nn.Module):
     descriptor_channels
         Width of the learned descriptor.
     kernel
-        Control points per axis.
+        Number of control points per axis.
     aggregate
-        Of the messages of the neighbours: "sum", as in the authors' example for FAUST, or "mean", as in their paper.
+        What is taken of the messages of the neighbours: the "sum", as in the authors' example for FAUST, or the "mean",
+        as in their paper.
     dropout
-        Between descriptor and classifier.
+        Dropout between the learned descriptor and the classifier.
 
     Notes
     -----
-    Neighbours are told apart by where they lie in space, so the learned descriptor changes when the shape is turned.
+    The convolutions tell neighbours apart by the direction in space, so the learned descriptor changes when the shape
+    is turned.
 
     References
     ----------
@@ -62,25 +64,16 @@ class SplineCNN(nn.Module):
         widths = itertools.pairwise((in_channels, *channels))
         self.convs = nn.ModuleList(SplineConv(a, b, kernel, aggregate) for a, b in widths)
         self.embed = nn.Linear(channels[-1], descriptor_channels)
-        self.dropout = nn.Dropout(dropout)
-        self.classifier = nn.Linear(descriptor_channels, n_classes)
+        self.add_classifier(descriptor_channels, n_classes, dropout)
+        self.kernel = kernel
 
-    @staticmethod
-    def stencils(kernel: int = 5, **_: Any) -> dict[str, dict[str, Any]]:
-        """Return the stencil that the convolutions gather with."""
-        return {"edge_splines": {"kernel": kernel}}
+    def stencils(self) -> dict[str, dict[str, Any]]:
+        """Return the stencil that the convolutions gather neighbours with: the edge splines."""
+        return {"edge_splines": {"kernel": self.kernel}}
 
-    def describe(self, x: Tensor, surface: Surface) -> Tensor:
-        """Return the learned descriptor, shape (N, descriptor_channels), of input features `x`, shape (N, P)."""
-        stencil = surface.stencil("edge_splines")
-        for conv in self.convs:
-            x = F.elu(conv(x, stencil))
-        return F.elu(self.embed(x))
-
-    def forward(self, x: Tensor, surface: Surface) -> Tensor:
-        """Return the logits over the template vertices, shape (N, n_classes)."""
-        y: Tensor = self.classifier(self.dropout(self.describe(x, surface)))
-        return y
+    def operators(self, surface: Surface, dtype: torch.dtype) -> tuple[Any, ...]:
+        """Return the tensors of the edge splines."""
+        return (surface.stencil("edge_splines"),)
 
 
 class SplineConv(nn.Module):
@@ -94,9 +87,9 @@ class SplineConv(nn.Module):
     in_channels, out_channels
         Channels C_in of the input and C_out of the output functions.
     kernel
-        s, control points per axis.
+        Number s of control points per axis.
     aggregate
-        "sum" as above, or "mean" with the sum over j divided by the number of neighbours.
+        "sum" for the formula above, or "mean" for its sum over j divided by the number of neighbours.
 
     Shapes
     ------
@@ -106,7 +99,7 @@ class SplineConv(nn.Module):
     def __init__(self, in_channels: int, out_channels: int, kernel: int = 5, aggregate: Aggregate = "sum") -> None:
         super().__init__()
         if aggregate not in get_args(Aggregate):
-            raise ValueError(f'aggregate is "sum" or "mean", got {aggregate!r}')
+            raise ValueError(f'aggregate must be "sum" or "mean", got {aggregate!r}')
         self.aggregate: Aggregate = aggregate
         self.weight = nn.Parameter(torch.empty(kernel**3, in_channels, out_channels))
         self.root = nn.Linear(in_channels, out_channels, bias=False)
@@ -114,14 +107,17 @@ class SplineConv(nn.Module):
         self.reset_parameters()
 
     def reset_parameters(self) -> None:
-        """Draw the weights uniformly, up to one over the root of their fan, as the authors do; set the bias to zero."""
+        """Draw the weights uniformly within one over the square root of their fan-in, as the authors do.
+
+        The bias is set to zero.
+        """
         points, fan_in, _ = self.weight.shape
         nn.init.uniform_(self.weight, -1 / math.sqrt(points * fan_in), 1 / math.sqrt(points * fan_in))
         nn.init.uniform_(self.root.weight, -1 / math.sqrt(fan_in), 1 / math.sqrt(fan_in))
         nn.init.zeros_(self.bias)
 
     def forward(self, x: Tensor, stencil: Mapping[str, Tensor]) -> Tensor:
-        """Convolve the functions `x`, shape (N, C_in), on the shape with these arrays of `EdgeSplines`."""
+        """Convolve the functions `x`, shape (N, C_in), on the shape with this stencil "edge_splines"."""
         messages = spline_messages(x, self.weight, stencil)
         if self.aggregate == "mean":
             messages = messages / stencil["degrees"][:, None].to(x.dtype)
@@ -135,33 +131,36 @@ class SplineConv(nn.Module):
 
 
 def spline_messages(x: Tensor, weight: Tensor, stencil: Mapping[str, Tensor]) -> Tensor:
-    """Return sum_m S_m x W_m, shape (N, C_out), for the matrices S_m of `csm.operators.stencils.edge_splines.EdgeSplines`.
+    """Return sum_m S_m x W_m, shape (N, C_out), for the matrices S_m of the stencil "edge_splines".
 
-    One control point is gathered, multiplied and scattered at a time, so nothing is larger than the functions
-    themselves.  The transpose of S_m is the matrix of the mirrored control point m'.  So with V_m = S_m dy, the
-    gradients are sum_m V_m W_m'^T and, for W_m', x^T V_m: again one gathering per control point.
+    One control point at a time is gathered, multiplied and scattered, so that no intermediate result is larger than
+    the functions themselves.  The transpose of S_m is the matrix of the mirrored control point m'.  With V_m = S_m dy,
+    the gradient of x is therefore sum_m V_m W_m'^T and that of W_m' is x^T V_m, and the backward pass also gathers once
+    per control point.
 
     Parameters
     ----------
     x
-        Shape (N, C_in).
+        Functions, shape (N, C_in).
     weight
         Shape (s^3, C_in, C_out).
     stencil
-        The arrays of `EdgeSplines` with a kernel of s.
+        The tensors of `csm.operators.stencils.edge_splines.EdgeSplines` with a kernel of s.
     """
     y: Tensor = _SplineMessages.apply(x, weight, stencil)  # type: ignore[no-untyped-call]
     return y
 
 
 class _Gathered(NamedTuple):
+    """The R_m rows of S_m x that are not empty, for one control point."""
+
     point: int
-    targets: Tensor  # (R_m,), each vertex at most once
+    targets: Tensor  # (R_m,), the vertices of the rows, each at most once
     rows: Tensor  # (R_m, C)
 
 
 def _gathered(x: Tensor, stencil: Mapping[str, Tensor]) -> Iterator[_Gathered]:
-    """Yield the rows of S_m x that are not empty, control point by control point."""
+    """Yield the rows of S_m x that are not empty, for one control point m after the other."""
     offsets = stencil["offsets"]
     bounds, starts = offsets.tolist(), stencil["indptr"][offsets].tolist()
     for point, ((begin, end), (first, last)) in enumerate(
@@ -174,6 +173,8 @@ def _gathered(x: Tensor, stencil: Mapping[str, Tensor]) -> Iterator[_Gathered]:
 
 
 class _SplineMessages(torch.autograd.Function):
+    """`spline_messages` with the gradients that its docstring derives."""
+
     @staticmethod
     def forward(ctx: Any, x: Tensor, weight: Tensor, stencil: Mapping[str, Tensor]) -> Tensor:
         ctx.save_for_backward(x, weight)

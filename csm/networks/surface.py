@@ -1,4 +1,4 @@
-"""What a network knows of the shape that its features live on."""
+"""Surface: what a network knows of a shape, apart from the descriptor of its vertices."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from csm.networks.basis import Basis
 
 
 class Surface(NamedTuple):
-    """One shape without its features: the eigenbasis, and the stencils that a network asked for.
+    """The eigenbasis of one shape, and the stencils that a network asked for.
 
-    `stencils` has, per name of a stencil, its tensors; which ones, and their shapes, `csm.operators.stencils` says.
+    `stencils` has, for the name of each stencil, its tensors by name; `csm.operators.stencils` documents them and their
+    shapes.
     """
 
     basis: Basis
@@ -31,10 +32,10 @@ class Surface(NamedTuple):
         Raises
         ------
         ValueError
-            If the shape was prepared without it.
+            If the shape was prepared without this stencil.
         """
         if name not in self.stencils:
-            raise ValueError(f"the network wants the stencil {name!r}; the shape was prepared without it")
+            raise ValueError(f"the network wants the stencil {name!r}, and the shape was prepared without it")
         return self.stencils[name]
 
     def to(self, device: torch.device | str) -> Surface:

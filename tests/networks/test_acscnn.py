@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 import torch
 
-from csm.networks import Basis, Surface
+from csm.networks import Basis, Surface, stencils_of
 from csm.networks.acscnn import ACSCNN, ACSConv, laplacians_of
 from tests.shapes import blob
 from tests.surfaces import surface_of
@@ -13,7 +13,7 @@ SMALL = {"terms": 4, "angles": 3, "channels": (6, 5), "descriptor_channels": 7}
 
 @pytest.fixture(scope="module")
 def surface() -> Surface:
-    return surface_of(blob(2), 4, ACSCNN.stencils(**SMALL))
+    return surface_of(blob(2), 4, stencils_of("acscnn", **SMALL))
 
 
 @pytest.mark.parametrize(("inputs", "count"), [(1, 4_418_154), (48, 4_803_178), (140, 5_556_842)])
@@ -96,7 +96,7 @@ def test_relabelling_the_vertices_permutes_the_descriptor(surface):
 
 
 def test_its_stencil_has_the_options_that_concern_it():
-    assert ACSCNN.stencils(alpha=4.0, terms=3) == {
+    assert ACSCNN(1, 2, alpha=4.0, terms=3).stencils() == {
         "albo": {"alpha": 4.0, "angles": 8, "frame": "line_field", "sweeps": 10, "smoothing": 0.08}
     }
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from csm.networks import ChebyNet, Surface
+from csm.networks import ChebyNet, Surface, stencils_of
 from csm.networks.chebynet import ChebConv, laplacian_of
 from csm.operators.laplacian import stiffness
 from csm.operators.stencils.scaled_laplacian import graph_laplacian
@@ -13,7 +13,7 @@ from tests.surfaces import surface_of
 
 
 def laplacian_surface(mesh, laplacian: str = "graph") -> Surface:
-    return surface_of(mesh, 4, ChebyNet.stencils(laplacian=laplacian))
+    return surface_of(mesh, 4, stencils_of("chebynet", laplacian=laplacian))
 
 
 @pytest.mark.parametrize(("terms", "count"), [(6, 1_898_506), (16, 2_083_146)])

@@ -77,3 +77,10 @@ def test_unknown_names_are_answered_with_the_known_ones():
         CSMCNN(3, 4, activation="sine")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="instance"):
         CSMCNN(3, 4, normalisation="layer")  # type: ignore[arg-type]
+
+
+def test_filters_are_those_of_the_convolutions_at_the_eigenvalues_that_they_use(basis):
+    net = CSMCNN(4, 30, (8, 6, 5), ks=20).double()
+    filters = net.filters(basis.evals)
+    assert {name: tuple(filter.shape) for name, filter in filters.items()} == {"conv1": (20, 8, 6), "conv2": (20, 6, 5)}
+    torch.testing.assert_close(filters["conv2"], net.convs[1].filters(basis.evals[:20]))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from csm.networks import Surface
+from csm.networks import Surface, stencils_of
 from csm.networks.diffusionnet import LEAST_TIME, Diffusion, DiffusionBlock, DiffusionNet, Gradient, GradientFeatures
 from tests.shapes import blob
 from tests.surfaces import surface_of
@@ -16,7 +16,7 @@ SMALL = {"width": 6, "blocks": 2, "ks": 20}
 
 @pytest.fixture(scope="module")
 def surface() -> Surface:
-    return surface_of(blob(2), 24, DiffusionNet.stencils())
+    return surface_of(blob(2), 24, stencils_of("diffusionnet"))
 
 
 @pytest.fixture
@@ -117,16 +117,16 @@ def test_motion_changes_nothing_and_numbering_only_the_order(surface, x):
     mesh, made = blob(2), net()
     before = made.describe(x, surface)
     spun = mesh.vertices @ np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]) + 1.0
-    moved = surface_of(replace(mesh, vertices=spun), 24, DiffusionNet.stencils())
+    moved = surface_of(replace(mesh, vertices=spun), 24, stencils_of("diffusionnet"))
     torch.testing.assert_close(made.describe(x, moved), before, atol=1e-5, rtol=1e-5)
     order = np.random.default_rng(0).permutation(162)
     renumbered = replace(mesh, vertices=mesh.vertices[order], faces=np.argsort(order)[mesh.faces])
-    after = made.describe(x[order], surface_of(renumbered, 24, DiffusionNet.stencils()))
+    after = made.describe(x[order], surface_of(renumbered, 24, stencils_of("diffusionnet")))
     torch.testing.assert_close(after, before[order], atol=1e-5, rtol=1e-5)
 
 
 def test_the_orientation_matters(surface, x):
-    inside_out = surface_of(replace(blob(2), faces=blob(2).faces[:, ::-1]), 24, DiffusionNet.stencils())
+    inside_out = surface_of(replace(blob(2), faces=blob(2).faces[:, ::-1]), 24, stencils_of("diffusionnet"))
     assert (net().describe(x, inside_out) - net().describe(x, surface)).abs().max() > 1e-3
 
 

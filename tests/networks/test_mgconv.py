@@ -9,7 +9,7 @@ from torch.func import functional_call
 
 from csm.networks import Surface, mgconv
 from csm.networks.mgconv import MGConv, WaveletOperators, unit_range
-from tests.operators.test_wavelets import SMALL, published
+from tests.operators.stencils.test_wavelets import SMALL, published
 from tests.shapes import blob
 from tests.surfaces import surface_of
 

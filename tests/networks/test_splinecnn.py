@@ -3,22 +3,23 @@ from __future__ import annotations
 import pytest
 import torch
 
-from csm.networks import SplineCNN, Surface
+from csm.mesh.topology import directed_edges
+from csm.networks import SplineCNN, Surface, stencils_of
 from csm.networks.splinecnn import SplineConv, spline_messages
 from csm.operators import Operators
-from csm.operators.stencils.edge_splines import directed_edges, pseudo_coordinates
+from csm.operators.stencils.edge_splines import pseudo_coordinates
 from tests.shapes import blob, plane
 from tests.surfaces import surface_of
 
 
 def spline_surface(mesh, kernel: int = 5) -> Surface:
-    return surface_of(mesh, 4, SplineCNN.stencils(kernel=kernel))
+    return surface_of(mesh, 4, stencils_of("splinecnn", kernel=kernel))
 
 
 def edge_by_edge(mesh, kernel: int, conv: SplineConv, x: torch.Tensor) -> torch.Tensor:
     """The convolution as the paper writes it: one weight matrix per edge, summed over all control points."""
     mesh = Operators(mesh).mesh
-    edges = directed_edges(mesh)
+    edges = directed_edges(mesh.faces, mesh.n_vertices)
     u = torch.as_tensor(pseudo_coordinates(mesh, edges))
     y = torch.zeros(len(x), conv.weight.shape[2], dtype=x.dtype)
     for target, source, place in zip(edges.targets, edges.sources, u, strict=True):
