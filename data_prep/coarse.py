@@ -1,7 +1,7 @@
-"""A coarse copy of a set of registered shapes, for quick experiments with one connectivity.
+"""Make a coarse copy of a set of registered shapes, for quick experiments with one connectivity.
 
 Some of the vertices are chosen on the first shape and joined by new faces; every other shape gets the same ones, so the
-vertices still correspond. The copy carries the geometry of the set, so its licence is that of the set:
+vertices still correspond. The copy contains the geometry of the set, so its licence is that of the set:
 
     python data_prep/coarse.py SHAPES OUT --vertices 1000
 """
@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from csm._types import IntArray
-from csm.data.folder import recognise
+from csm.data.registry import recognise
 from csm.errors import CsmError, DataError
 from csm.mesh.io import write_mesh
 from csm.mesh.remesh import remesh
@@ -59,11 +59,11 @@ def main() -> int:
     """Read the command line and run; return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("shapes", type=Path, help="folder of registered shapes")
-    parser.add_argument("out", type=Path, help="folder to make")
+    parser.add_argument("out", type=Path, help="new folder for the copy")
     parser.add_argument("--vertices", type=int, default=1000)
     given = parser.parse_args()
     if given.out.exists():
-        parser.error(f"{given.out} is there already; choose another folder")
+        parser.error(f"{given.out} exists already; choose another folder")
     try:
         run(given.shapes, given.out, given.vertices)
     except CsmError as error:

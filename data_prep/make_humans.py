@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import torch
 from humans.bodies import LOCAL_SHAPES, PHENOTYPES, POSES, SUBJECTS, Rig, pose_matrices
-from humans.caps import cap
+from humans.close_cavities import close_cavities
 from humans.decimate import Decimation
-from humans.flips import flip_towards_delaunay
+from humans.edge_flips import flip_towards_delaunay
 from humans.intersect import intersecting_pairs, untangle
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
@@ -49,7 +49,7 @@ def main() -> None:
     model = anny.Anny(local_changes="default")
     template, faces, part, mirror = body_surface(model)
     shapes = people(model, args.seed)[:, part]
-    faces = cap(template, faces, cavity_faces(model, part), mirror)
+    faces = close_cavities(template, faces, cavity_faces(model, part), mirror)
     shapes, faces, mirror = simplify(shapes, faces, mirror, args.vertices)
     shapes = np.stack([stand(repair(v, faces, k)) for k, v in enumerate(tqdm(shapes, desc="untangle"))])
     write(args.out, shapes, faces, mirror, args.seed)

@@ -1,14 +1,14 @@
 """Remeshed TOSCA (about 5000 vertices) of the SGA18/BCICP set.
 
-Unpacks, checks and lays out what you have downloaded as a folder that csm reads:
+Unpacks and checks what you have downloaded, and lays it out as a folder that csm reads:
 
     python data_prep/tosca.py DOWNLOAD... --out DATA [--store]
 """
 
 import sys
 
-from csm.data.intake import script
-from csm.data.kinds import SGA18_TOSCA
+from csm.data.tosca import SGA18
+from csm.data.unpacking import script
 
 if __name__ == "__main__":
-    sys.exit(script(__doc__.partition("\n")[0], [SGA18_TOSCA]))
+    sys.exit(script(__doc__.partition("\n")[0], [SGA18]))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from csm.data.datasets import FolderDataModule
+from csm.data.folder import FolderDataModule
 from csm.data.store import Store
 from csm.descriptors import ACD
 from csm.mesh.io import write_mesh
@@ -29,7 +29,7 @@ def toy_datamodule(folder: Path, **options: object) -> FolderDataModule:
     """Return a data module over `write_toys(folder)`: four shapes train, two test."""
     write_toys(folder / "toys")
     settings: dict[str, object] = {
-        "descriptor": ACD(angles=4, k=8, order=3),
+        "descriptor": ACD(angles=4, k=8, order=3, cuts=1),
         "basis_k": 24,
         "n_test": 2,
         "store": Store(folder / "store"),

@@ -1,4 +1,8 @@
-"""The built-in humans: 10 people in 10 poses with one connectivity, free to use (see csm/assets/humans.md)."""
+"""The built-in humans: 10 people in 10 poses with one connectivity, free to use (see csm/assets/humans.md).
+
+As a set of shapes they come as they are, refined (the original vertices first, as LPS-data does with FAUST) or remeshed
+(other vertices and triangles altogether, as LRVD does), always with exact ground truth.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +10,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from importlib import resources
-from typing import overload
+from pathlib import Path
+from typing import Any, Literal, TypeAlias, get_args, overload
 
 import numpy as np
 
 from csm._types import Arrays, FloatArray, IntArray
-from csm.errors import DataError
+from csm.data.base import DataModule, DataSet
+from csm.data.shapes import Shape
+from csm.data.splits import Split, as_split
+from csm.data.store import Store
+from csm.errors import ConfigError, DataError
 from csm.mesh.correspondence import Direction, PointMap
+from csm.mesh.remesh import refine, remesh
 from csm.mesh.shape import Mesh
+
+Variant: TypeAlias = Literal["original", "refined", "remeshed"]
 
 
 @dataclass(frozen=True)
@@ -131,11 +143,6 @@ def load_humans() -> Humans:
     return Humans(read_asset())
 
 
-def mirror() -> PointMap:
-    """Return the exact left-right map of the template of the built-in humans; see `Humans.mirror`."""
-    return load_humans().mirror()
-
-
 def read_asset() -> Arrays:
     """Read csm/assets/humans.npz from the installed package.
 
@@ -153,3 +160,133 @@ def read_asset() -> Arrays:
         raise DataError("csm/assets/humans.npz is missing from this installation of csm; install the package again")
     with asset.open("rb") as file, np.load(file, allow_pickle=False) as archive:
         return {key: archive[key] for key in archive.files}
+
+
+@dataclass(frozen=True)
+class HumansSet:
+    """The built-in humans over the template of their common connectivity.
+
+    Parameters
+    ----------
+    variant
+        "original": the shipped meshes; "refined": finer, the original vertices first (as LPS-data does with FAUST);
+        "remeshed": other vertices and triangles altogether (as LRVD does).
+    n_vertices
+        Of the refined or remeshed meshes; 0 for the original ones.
+    store_root
+        Folder of the store that keeps refined and remeshed meshes; None for the default one.
+    seed
+        Of the remeshing.
+    """
+
+    variant: Variant = "original"
+    n_vertices: int = 0
+    store_root: str | None = None
+    seed: int = 0
+
+    @classmethod
+    def parse(cls, text: str, store_root: str | None = None) -> HumansSet:
+        """Make a set from its short name: "original", "refined_10000", "remeshed_5000".
+
+        Raises
+        ------
+        ConfigError
+            If the name has another form.
+
+        Examples
+        --------
+        >>> HumansSet.parse("refined_10000").name
+        'humans_refined_10000'
+        """
+        variant, _, count = text.partition("_")
+        if variant not in get_args(Variant) or (variant == "original") != (count == "") or not (count or "0").isdigit():
+            raise ConfigError(
+                f"built-in humans: {text!r} is not the name of a set; wanted original, refined_N or remeshed_N"
+            )
+        return cls(variant, int(count or 0), store_root)  # type: ignore[arg-type]
+
+    @property
+    def name(self) -> str:
+        """Name of the set in results."""
+        return "humans" if self.variant == "original" else f"humans_{self.variant}_{self.n_vertices}"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the shapes, person by person: "s00_p00" to "s09_p09"."""
+        return load_humans().names
+
+    def load(self, name: str) -> Shape:
+        """Return one shape; a refined or remeshed one is computed once and kept in the store."""
+        humans = load_humans()
+        original, flip = humans.mesh(name), humans.mirror().indices
+        if self.variant == "original":
+            return Shape(original, PointMap.identity(original.n_vertices, name=name), humans.mirror())
+        made = remeshed(original, self.variant, self.n_vertices, self.seed, Store(self.store_root))
+        mesh = Mesh(made["vertices"], made["faces"], name)
+        truth = PointMap(made["truth"], Direction.TEMPLATE_TO_SHAPE, mesh.n_vertices, name)
+        mirror = PointMap(made["truth"][flip], Direction.TEMPLATE_TO_SHAPE, mesh.n_vertices, f"{name}, mirrored")
+        return Shape(mesh, truth, mirror)
+
+
+def remeshed(original: Mesh, variant: str, n_vertices: int, seed: int, store: Store) -> Arrays:
+    """Return vertices, faces and truth (the vertex of every original one) of a "refined" or "remeshed" mesh.
+
+    It is computed once and kept in the store.
+    """
+
+    def make() -> Arrays:
+        made = (refine if variant == "refined" else remesh)(original, n_vertices, seed)
+        return {"vertices": made.mesh.vertices, "faces": made.mesh.faces, "truth": made.truth.indices}
+
+    return store.fetch("remesh", original, {"variant": variant, "n_vertices": n_vertices, "seed": seed}, make)
+
+
+def _names(persons: Sequence[int], poses: Sequence[int]) -> tuple[str, ...]:
+    return tuple(f"s{person:02d}_p{pose:02d}" for person in persons for pose in poses)
+
+
+SPLITS = (
+    Split(
+        "humans_80_20",
+        _names(range(8), range(10)),
+        _names(range(8, 10), range(10)),
+        "csm: persons 0 to 7 of the built-in humans train, 8 and 9 test",
+    ),
+    Split(
+        "humans_demo",
+        _names((0, 2, 4, 6), (0, 2, 4, 6, 8)),
+        _names((8, 9), (1, 5, 9)),
+        "csm: a few of the built-in humans for the demo; persons 8 and 9 and odd poses are unseen",
+    ),
+)
+
+
+class HumansDataModule(DataModule):
+    """The built-in humans, which need no download; tests at other resolutions are made from them.
+
+    Parameters
+    ----------
+    train
+        Set to train on: "original", or "refined_N" or "remeshed_N" with N vertices.
+    test
+        Sets to test on.
+    split
+        A split, its name, or the path of a split file.
+    options
+        Of `csm.data.base.DataModule`.
+    """
+
+    def __init__(
+        self,
+        train: str = "original",
+        test: Sequence[str] = ("original", "refined_10000", "refined_15000", "remeshed_5000"),
+        split: str | Path | Split = SPLITS[0].name,
+        **options: Any,
+    ) -> None:
+        store: Store | None = options.get("store")
+        root = None if store is None else str(store.root)
+        tests = [HumansSet.parse(text, root) for text in test]
+        super().__init__(HumansSet.parse(train, root), tests, as_split(split, SPLITS), **options)
+
+
+DATA_SET = DataSet(HumansDataModule, splits=SPLITS)

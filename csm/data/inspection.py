@@ -1,11 +1,11 @@
-"""Look through all shapes of a set: sizes, findings, and whether the maps can be read."""
+"""Inspect all shapes of a set: sizes, findings, and whether the maps can be read."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from csm._progress import progress_bar
-from csm.data.folderset import FolderSet
+from csm.data.folders import FolderSet
 from csm.errors import CsmError
 from csm.mesh.check import Finding, check
 from csm.mesh.shape import Mesh

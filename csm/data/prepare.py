@@ -1,25 +1,25 @@
-"""Fill the store: eigenbases and descriptors of many shapes, in parallel, resumable."""
+"""Fill the store with eigenbases, descriptors and stencils of many shapes, in parallel and resumable."""
 
 from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any
 
 import numpy as np
 
-from csm._processes import processes, run_all
+from csm._parallel import n_processes, parallel_map
 from csm._types import Arrays, Float32Array
-from csm.data.shapeset import Shape, ShapeSet
+from csm.data.shapes import ShapeSet
 from csm.data.store import Store
 from csm.descriptors.base import Descriptor, record
 from csm.errors import CsmError
 from csm.mesh.check import require_usable
 from csm.mesh.shape import Mesh
-from csm.operators.operators import Operators
-from csm.operators.spectrum import Spectrum
+from csm.operators import Operators, Spectrum
 from csm.operators.stencils import Stencil
 
 _log = logging.getLogger(__name__)
@@ -27,16 +27,16 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Recipe:
-    """What a network wants to know of every shape.
+    """What a method needs to know of every shape.
 
     Parameters
     ----------
     descriptor
-        Gives the input features.
+        Gives the features.
     basis_k
-        How many Laplace-Beltrami eigenpairs are kept.
+        How many Laplace-Beltrami eigenpairs are kept; 0 for none.
     stencils
-        What else it wants to know.
+        What else a network needs.
     """
 
     descriptor: Descriptor
@@ -46,11 +46,11 @@ class Recipe:
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A shape with its features, shape (N, Q), and of its unit-area copy the eigenbasis and the stencils by name."""
+    """A mesh with its features, shape (N, Q), and of its unit-area copy the eigenbasis and the stencils by name."""
 
-    shape: Shape
+    mesh: Mesh
     features: Float32Array
-    basis: Spectrum
+    basis: Spectrum | None
     stencils: Mapping[str, Arrays] = field(default_factory=dict)
 
 
@@ -69,7 +69,7 @@ class Job:
 
 @dataclass
 class Summary:
-    """What a preparation did: how many shapes were already there, made, or failed, and why."""
+    """What a preparation did: how many shapes the store had, how many were computed, and which failed and why."""
 
     present: int = 0
     made: int = 0
@@ -82,77 +82,103 @@ class Summary:
         return "\n".join(f"{label:<{width}}  {why}" for label, why in self.failures)
 
 
-def compute_features(
-    mesh: Mesh, descriptor: Descriptor, store: Store, operators: Operators | None = None
-) -> Float32Array:
+class _Bases:
+    """A memo that keeps the eigenbases of some sizes in the store; other spectra last as long as their operators."""
+
+    def __init__(self, store: Store, sizes: frozenset[int]) -> None:
+        self._store, self._sizes = store, sizes
+
+    def fetch(self, kind: str, mesh: Mesh, params: Mapping[str, Any], make: Callable[[], Arrays]) -> Arrays:
+        kept = kind == "lbo" and params["k"] in self._sizes
+        return self._store.fetch(kind, mesh, params, make) if kept else make()
+
+
+def shared_operators(mesh: Mesh, recipes: Sequence[Recipe], store: Store) -> Operators:
+    """Return operators of a mesh at unit area from which all these recipes are computed, with shared eigenproblems."""
+    return Operators(mesh, memo=_Bases(store, frozenset(recipe.basis_k for recipe in recipes)))
+
+
+def features_of(mesh: Mesh, descriptor: Descriptor, store: Store, operators: Operators | None = None) -> Float32Array:
     """Return the descriptor of a mesh, shape (N, Q), from the store or computed and kept.
 
-    `operators` of the mesh at unit area may be given, so that several descriptors share their eigenpairs.
+    Parameters
+    ----------
+    mesh
+        The shape, at any scale.
+    descriptor
+        It is looked up, and kept, by its parameters.
+    store
+        Where it is kept.
+    operators
+        Of the mesh at unit area, so that several descriptors share their eigenpairs.
     """
 
     def make() -> dict[str, Float32Array]:
-        require_usable(mesh)
+        if operators is None:
+            require_usable(mesh)
         return {"values": descriptor(operators or mesh).values.astype(np.float32)}
 
     values: Float32Array = store.fetch("descriptor", mesh, record(descriptor), make)["values"]
     return values
 
 
-def prepare_shape(shape: Shape, recipe: Recipe, store: Store) -> Prepared:
-    """Return one shape with features and basis, from the store where they are there."""
-    features = compute_features(shape.mesh, recipe.descriptor, store)
-    operators = Operators(shape.mesh, memo=store)
-    basis = operators.lbo(recipe.basis_k)  # before a stencil asks for more pairs, or the store would never hold these
-    stencils = {s.name: _arrays_of(s, operators, store) for s in recipe.stencils}
-    return Prepared(shape, features, basis, stencils)
+def prepare_mesh(mesh: Mesh, recipe: Recipe, store: Store, operators: Operators | None = None) -> Prepared:
+    """Return one mesh with features, basis and stencils; what the store lacks is computed and kept there.
 
-
-def _arrays_of(stencil: Stencil, operators: Operators, store: Store) -> Arrays:
-    return store.fetch(f"stencil-{stencil.name}", operators.mesh, stencil.parameters(), lambda: stencil(operators))
+    Parameters
+    ----------
+    mesh, recipe, store
+        The shape, what to compute, and where it is kept.
+    operators
+        From `shared_operators`, if other recipes are computed for the same mesh.
+    """
+    operators = operators or shared_operators(mesh, [recipe], store)
+    if recipe.basis_k > recipe.descriptor.eigenpairs:
+        operators.lbo(recipe.basis_k)  # first, so that the descriptor takes its eigenpairs from these
+    features = features_of(mesh, recipe.descriptor, store, operators)
+    basis = operators.lbo(recipe.basis_k) if recipe.basis_k else None
+    unit = operators.mesh
+    stencils = {
+        s.name: store.fetch(f"stencil-{s.name}", unit, s.parameters(), partial(s, operators)) for s in recipe.stencils
+    }
+    return Prepared(mesh, features, basis, stencils)
 
 
 def is_prepared(mesh: Mesh, recipe: Recipe, store: Store) -> bool:
-    """Tell whether `prepare_shape` would find everything in the store; nothing is read."""
+    """Tell whether `prepare_mesh` would find everything in the store; nothing is read."""
+    if not store.has("descriptor", mesh, record(recipe.descriptor)):
+        return False
+    if not recipe.basis_k and not recipe.stencils:
+        return True
     unit = mesh.unit_area()
-    return (
-        store.has("descriptor", mesh, record(recipe.descriptor))
-        and store.has("lbo", unit, {"k": recipe.basis_k})
-        and all(store.has(f"stencil-{s.name}", unit, s.parameters()) for s in recipe.stencils)
+    return (not recipe.basis_k or store.has("lbo", unit, {"k": recipe.basis_k})) and all(
+        store.has(f"stencil-{s.name}", unit, s.parameters()) for s in recipe.stencils
     )
 
 
-def _prepare_one(job: Job, recipe: Recipe, root: str) -> tuple[str, str]:
-    """Prepare one shape in a worker; return what happened ("present", "made" or "failed") and why."""
-    store = Store(root)
-    try:
-        shape = job.shapes.load(job.name)
-        if not is_prepared(shape.mesh, recipe, store):
-            prepare_shape(shape, recipe, store)
-    except CsmError as error:
-        return "failed", str(error)
-    except Exception as error:  # one bad shape must not end the run; the table at the end names it
-        _log.exception("%s", job.label)
-        return "failed", f"{type(error).__name__}: {error}"
-    return ("made" if store.computed else "present"), ""
-
-
 def prepare(
-    jobs: Sequence[Job], recipe: Recipe, store: Store, *, workers: int | None = None, progress: bool = True
+    jobs: Sequence[Job],
+    recipes: Sequence[Recipe],
+    store: Store,
+    *,
+    workers: int | None = None,
+    progress: bool = True,
 ) -> Summary:
-    """Fill the store for many shapes; what is there already is skipped, so a killed run is simply started again.
+    """Fill the store for many shapes.  Entries that exist are not computed again, so a killed run can be restarted.
 
-    Entries that are there are not read, as whoever loads them will; one with a fault inside is computed again then.
+    All recipes of a shape share its eigenproblems.  Entries that exist are not read either; a fault inside one is found
+    when it is loaded, and the entry is computed again then.
 
     Parameters
     ----------
     jobs
         The shapes.
-    recipe
+    recipes
         What to compute for each.
     store
-        Where it goes.
+        Where the results are kept.
     workers
-        Processes, each with one BLAS thread; see `csm._processes.processes`.
+        Processes, each with one BLAS thread; see `csm._parallel.n_processes`.
     progress
         Show a progress bar with the shape's name and the estimated time left.
 
@@ -162,9 +188,35 @@ def prepare(
         Failures are listed there, not raised.
     """
     begun = time.perf_counter()
-    one = partial(_prepare_one, recipe=recipe, root=str(store.root))
-    count = processes(workers, len(jobs))
-    done = run_all(one, jobs, lambda job: job.label, count, what="prepare", unit="shape", progress=progress)
+    one = partial(_prepare_one, recipes=tuple(recipes), root=str(store.root))
+    count = n_processes(workers, len(jobs))
+    done = parallel_map(one, jobs, lambda job: job.label, count, what="prepare", unit="shape", progress=progress)
     states = [state for state, _ in done]
     failures = [(job.label, why) for job, (state, why) in zip(jobs, done, strict=True) if state == "failed"]
     return Summary(states.count("present"), states.count("made"), failures, time.perf_counter() - begun)
+
+
+def _prepare_one(job: Job, recipes: Sequence[Recipe], root: str) -> tuple[str, str]:
+    """Prepare one shape in a worker; return what happened ("present", "made" or "failed") and why."""
+    store = Store(root)
+    try:
+        _prepare_missing(job.shapes.load(job.name).mesh, recipes, store)
+    except CsmError as error:
+        return "failed", str(error)
+    except Exception as error:  # one bad shape must not end the run; the table of failures names it
+        _log.exception("%s", job.label)
+        return "failed", f"{type(error).__name__}: {error}"
+    return ("made" if store.computed else "present"), ""
+
+
+def _prepare_missing(mesh: Mesh, recipes: Sequence[Recipe], store: Store) -> None:
+    missing = [recipe for recipe in recipes if not is_prepared(mesh, recipe, store)]
+    if not missing:
+        return
+    operators = shared_operators(mesh, missing, store)
+    for recipe in sorted(missing, key=_eigenpairs, reverse=True):  # the largest spectrum serves the others
+        prepare_mesh(mesh, recipe, store, operators)
+
+
+def _eigenpairs(recipe: Recipe) -> int:
+    return max(recipe.descriptor.eigenpairs, recipe.basis_k)

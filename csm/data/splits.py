@@ -60,7 +60,7 @@ class Split:
         if missing:
             raise DataError(
                 f"{where}: {len(missing)} of the {len(wanted)} {part} shapes of split {self.name} are missing "
-                f"({', '.join(missing[:5])}{', ...' if len(missing) > 5 else ''}); `csm check` tells what is there"
+                f"({', '.join(missing[:5])}{', ...' if len(missing) > 5 else ''}); `csm check` lists what a folder has"
             )
 
 
@@ -85,3 +85,30 @@ def read_split(path: str | Path) -> Split:
     if stated != split.checksum:
         raise DataError(f"{path}: the lists have checksum {split.checksum}, the file states {stated}: it was edited")
     return split
+
+
+def as_split(split: str | Path | Split, known: Sequence[Split] = ()) -> Split:
+    """Return a split: as it is given, one of the known ones by its name, or read from a json file.
+
+    Raises
+    ------
+    DataError
+        If there is no such name or file.
+
+    Examples
+    --------
+    >>> as_split("tiny", [Split("tiny", ("a", "b"), ("c",))]).test
+    ('c',)
+    """
+    if isinstance(split, Split):
+        return split
+    named = {entry.name: entry for entry in known}
+    if str(split) in named:
+        return named[str(split)]
+    if not Path(split).is_file():
+        raise DataError(
+            f"split={split}: there is no such file; wanted {' or '.join(named)}, or the path of a json file"
+            if named
+            else f"split={split}: there is no such file; wanted the path of a json file"
+        )
+    return read_split(split)

@@ -1,9 +1,10 @@
 """A content-addressed store of everything that is computed once per shape.
 
-One entry is one ``.npz`` file without pickle, named by the hash of what went in: geometry, kind, every parameter and
-the schema number.  A changed parameter is another entry, so nothing stale can be served.  The file carries its own
-description.  Entries are written to a temporary name and renamed, so several processes may share a store: losing a race
-costs a little work and harms nothing.
+One entry is one ``.npz`` file without pickle.  Its name is the hash of what it depends on: the geometry, the kind,
+every parameter, the version of a formula that was changed, and the number of the file format.  Another parameter makes
+another entry, so an outdated one is never returned.  The file contains its own description.  Entries are written under
+a temporary name and renamed, so several processes may share a store: two that compute the same entry at once lose a
+little time and nothing else.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import time
 import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -30,7 +32,11 @@ from csm.mesh.io import atomic_path
 from csm.mesh.shape import Mesh
 
 SCHEMA = 1
-"""Raise this when the meaning of stored arrays changes; entries of another schema are recomputed."""
+"""Number of the file format; entries of another format are recomputed.
+
+Where a formula changes, the `version` of its descriptor or stencil is raised instead, which changes the keys of its own
+entries and of no others.
+"""
 
 _META = "__meta__"
 _ENTRY_NAME = re.compile(r"[0-9a-f]{40}\.npz")
@@ -77,14 +83,14 @@ class Store:
         return self.root / kind / f"{hashlib.sha256(request.encode()).hexdigest()[:40]}.npz"
 
     def has(self, kind: str, mesh: Mesh, params: Mapping[str, Any]) -> bool:
-        """Tell whether the entry is there, with the end of its file; faults inside show when it is read."""
+        """Tell whether the entry exists and its file is not cut off; other faults are found when it is read."""
         path = self.path(kind, mesh, params)
         return path.is_file() and zipfile.is_zipfile(path)
 
     def fetch(self, kind: str, mesh: Mesh, params: Mapping[str, Any], make: Callable[[], Arrays]) -> Arrays:
-        """Return the entry's arrays; compute them with `make` and keep them if they are not there yet.
+        """Return the entry's arrays; if there is no entry yet, compute them with `make` and keep them.
 
-        A file that is corrupt, or that another program put there, is reported, left out and computed again.
+        A file that is corrupt, or that another program wrote, is reported and replaced by a new entry.
 
         Parameters
         ----------
@@ -97,16 +103,23 @@ class Store:
         make
             Called without arguments when the entry has to be computed.
         """
+        found = self.read(kind, mesh, params)
+        if found is not None:
+            return found
+        arrays = make()
+        self.computed += 1
+        self._write(self.path(kind, mesh, params), kind, mesh, params, arrays)
+        return arrays
+
+    def read(self, kind: str, mesh: Mesh, params: Mapping[str, Any]) -> Arrays | None:
+        """Return the entry's arrays if it exists and is sound, else None; parameters as of `fetch`."""
         path = self.path(kind, mesh, params)
         if path.is_file():
             try:
                 return read_entry(path)[1]
             except DataError as error:
                 _log.warning("%s; computing it again", error)
-        arrays = make()
-        self.computed += 1
-        self._write(path, kind, mesh, params, arrays)
-        return arrays
+        return None
 
     def _write(self, path: Path, kind: str, mesh: Mesh, params: Mapping[str, Any], arrays: Arrays) -> None:
         meta = {
@@ -116,14 +129,14 @@ class Store:
             "geometry": mesh.digest,
             "params": dict(params),
             "created": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
-            "versions": {name: version(name) for name in ("csm", "numpy", "scipy")},
+            "versions": _versions(),
         }
         header = np.frombuffer(json.dumps(meta).encode(), dtype=np.uint8)
         with atomic_path(path) as temporary, temporary.open("wb") as file:
             np.savez(file, allow_pickle=False, **{_META: header}, **arrays)
 
     def files(self) -> list[Path]:
-        """Return the files that carry an entry's name, sound or not, in a fixed order; other files are not csm's."""
+        """Return the files with the name of an entry, sound or not, in a fixed order; other files are not csm's."""
         return sorted(path for path in self.root.glob("*/*.npz") if _ENTRY_NAME.fullmatch(path.name))
 
     def check(self) -> tuple[list[Entry], list[str]]:
@@ -140,7 +153,7 @@ class Store:
     def prune(self, *, unused_days: float | None = None) -> list[Path]:
         """Delete what cannot be used: faulty files, other schemas, and temporary files older than an hour.
 
-        Files that do not carry an entry's name are never touched.
+        Files without the name of an entry are never touched.
 
         Parameters
         ----------
@@ -157,6 +170,12 @@ class Store:
         for path in [*left_over, *waste]:
             path.unlink(missing_ok=True)
         return [*left_over, *waste]
+
+
+@cache
+def _versions() -> dict[str, str]:
+    """Return the versions of what entries are computed with; asking the installation takes 5 ms each."""
+    return {name: version(name) for name in ("csm", "numpy", "scipy")}
 
 
 def _idle_seconds(path: Path) -> float:

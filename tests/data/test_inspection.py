@@ -1,7 +1,7 @@
 import numpy as np
 
-from csm.data.folder import recognise
 from csm.data.inspection import inspect
+from csm.data.registry import recognise
 from csm.mesh.io import write_map, write_mesh
 from csm.mesh.shape import Mesh
 from tests.data import layouts

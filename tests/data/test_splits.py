@@ -4,34 +4,42 @@ import json
 
 import pytest
 
-from csm.data.splits import Split, read_split
+from csm.data.registry import DATA_SETS, data_set
+from csm.data.splits import Split, as_split, read_split
 from csm.errors import DataError
-from tests.conftest import ROOT
+
+CHECKSUMS = {
+    "faust_80_20": "8f0cebb95e75",
+    "humans_80_20": "fc95d86ef489",
+    "humans_demo": "c94125a1c470",
+    "scape_51_20": "59b854fde6c0",
+}
+"""Of the splits that results were published with; they never change."""
+
+TINY = Split("tiny", ("x", "y"), ("z",), "made up")
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "conf/split").glob("*.json")), ids=lambda p: p.stem)
-def test_shipped_splits_are_sound_and_state_their_checksum(path):
-    split = read_split(path)
-    assert split.name == path.stem
-    assert split.source
-    assert json.loads(path.read_text())["checksum"] == split.checksum
-
-
-def test_the_papers_splits():
-    faust, scape = (read_split(ROOT / f"conf/split/{n}.json") for n in ("faust_80_20", "scape_51_20"))
-    assert (faust.train[0], faust.train[-1], faust.test[0], faust.test[-1]) == (
-        "tr_reg_000",
-        "tr_reg_079",
-        "tr_reg_080",
-        "tr_reg_099",
-    )
-    assert (len(scape.train), len(scape.test)) == (51, 20)
-    assert "mesh051" not in scape.train + scape.test
+def test_the_splits_of_csm_are_those_that_results_were_published_with():
+    splits = [split for name in DATA_SETS for split in data_set(name).splits]
+    assert {split.name: split.checksum for split in splits} == CHECKSUMS
+    assert all(split.source for split in splits)
+    assert all(len({*s.train, *s.test}) == len(s.train) + len(s.test) for s in splits)
 
 
 def test_the_checksum_depends_on_order_and_names():
     sums = {Split("a", *lists).checksum for lists in ((("x", "y"), ("z",)), (("y", "x"), ("z",)), (("x",), ("y", "z")))}
     assert len(sums) == 3
+    assert Split("other name", TINY.train, TINY.test).checksum == TINY.checksum
+
+
+def test_a_label_names_sizes_and_checksum():
+    assert TINY.label == f"tiny (2 train, 1 test, {TINY.checksum})"
+
+
+def test_a_split_is_read_from_json(tmp_path):
+    content = {"name": "tiny", "train": ["x", "y"], "test": ["z"], "source": "made up", "checksum": TINY.checksum}
+    (tmp_path / "s.json").write_text(json.dumps(content))
+    assert read_split(tmp_path / "s.json") == TINY
 
 
 @pytest.mark.parametrize(
@@ -50,9 +58,27 @@ def test_bad_files_are_named(tmp_path, content, message):
     assert "s.json" in str(caught.value)
 
 
+def test_a_split_is_given_by_itself_its_name_or_a_file(tmp_path):
+    other = Split("other", ("x",), ("z",))
+    assert as_split(TINY) is TINY
+    assert as_split("tiny", [other, TINY]) is TINY
+    path = tmp_path / "s.json"
+    path.write_text('{"name": "other", "train": ["x"], "test": ["z"]}')
+    assert as_split(path, [TINY]) == as_split(str(path)) == other
+    with pytest.raises(DataError, match=r"split=tinny: .*wanted other or tiny, or the path of a json file"):
+        as_split("tinny", [other, TINY])
+    with pytest.raises(DataError, match=r"split=nowhere\.json: .*wanted the path of a json file"):
+        as_split("nowhere.json")
+
+
 def test_holding_out_everything_is_an_error():
-    split = Split("a", ("x", "y"), ("z",))
-    assert split.held_out(1) == (("x",), ("y",))
-    assert split.held_out(0) == (("x", "y"), ())
+    assert TINY.held_out(1) == (("x",), ("y",))
+    assert TINY.held_out(0) == (("x", "y"), ())
     with pytest.raises(DataError, match="cannot hold out 2 of 2"):
-        split.held_out(2)
+        TINY.held_out(2)
+
+
+def test_shapes_that_a_set_lacks_are_named():
+    TINY.require(["z", "y", "x"], "set", "train")
+    with pytest.raises(DataError, match=r"set: 1 of the 2 train shapes of split tiny are missing \(y\)"):
+        TINY.require(["x", "z"], "set", "train")

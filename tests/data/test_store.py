@@ -57,6 +57,30 @@ def test_the_smallest_move_of_a_vertex_is_another_entry(store):
     assert not store.has("kind", Mesh(moved, mesh.faces), {})
 
 
+TETRAHEDRON = Mesh(
+    np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]), np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        ("lbo", "a861ef3c6391ffc29e4f1ffed86c198893193146.npz"),
+        ("stencil-x", "fa4aab6533298fcabc6ec8b93035e2636b4961f9.npz"),
+    ],
+)
+def test_keys_never_change(store, kind, name):
+    assert store.path(kind, TETRAHEDRON, {"k": 3}) == store.root / kind / name
+
+
+def test_reading_computes_nothing(store):
+    assert store.read("kind", sphere(1), {"k": 3}) is None
+    store.fetch("kind", sphere(1), {"k": 3}, arrays)
+    np.testing.assert_array_equal(store.read("kind", sphere(1), {"k": 3})["a"], arrays()["a"])
+    assert store.read("kind", sphere(1), {"k": 4}) is None
+    assert store.computed == 1
+
+
 def test_an_entry_describes_itself(store):
     store.fetch("kind", sphere(1), {"k": 3}, arrays)
     (entry,), faults = store.check()

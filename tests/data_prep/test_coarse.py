@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from csm.data.folder import recognise
+from csm.data.registry import recognise
 from csm.mesh.check import check
 from csm.mesh.io import write_mesh
 from csm.mesh.shape import Mesh
@@ -53,7 +53,7 @@ def test_the_copies_have_the_same_vertices_and_sound_faces(shapes, tmp_path, cal
 
 def test_nothing_is_overwritten_and_other_faces_are_refused(shapes, tmp_path, call, capsys):
     assert call(shapes, shapes) == 2
-    assert "is there already" in capsys.readouterr().err
+    assert "exists already" in capsys.readouterr().err
     mesh = blob(3)
     write_mesh(shapes / "shape2.off", Mesh(mesh.vertices, mesh.faces[::-1], "shape2"))
     assert call(shapes, tmp_path / "out", "--vertices", 100) == 2

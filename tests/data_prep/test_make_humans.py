@@ -1,4 +1,4 @@
-"""What makes the built-in humans, on spheres: decimation, flips, caps, intersections, poses and the file."""
+"""The steps that make the built-in humans, on spheres: decimation, flips, closed cavities, intersections and poses."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def excess(vertices: np.ndarray, faces: np.ndarray) -> float:
 
 
 def test_flips_make_a_stretched_ball_more_delaunay_and_leave_a_round_one_alone(load, ball):
-    flip = load("humans.flips").flip_towards_delaunay
+    flip = load("humans.edge_flips").flip_towards_delaunay
     vertices, faces, mirror = ball
     assert oriented(flip(vertices[None], faces, mirror)) == oriented(faces)
     long = vertices * [1, 1, 3]
@@ -108,14 +108,14 @@ def test_flips_make_a_stretched_ball_more_delaunay_and_leave_a_round_one_alone(l
     assert excess(long, flipped) < 0.5 * excess(long, faces)
 
 
-def test_cavities_on_the_midline_and_on_both_sides_are_capped(load, ball):
-    caps = load("humans.caps")
+def test_cavities_on_the_midline_and_on_both_sides_are_closed(load, ball):
+    module = load("humans.close_cavities")
     vertices, faces, mirror = ball
     one_ring = (faces == vertices[:, 2].argmax()).any(1)
     two_rings = np.isin(faces, faces[one_ring]).any(1)
     cavity = two_rings | (np.abs(vertices[faces].mean(1)[:, 0]) > 0.85)
-    assert len(caps.boundary_loops(faces[cavity])) == 3
-    closed = caps.cap(vertices, faces, cavity, mirror)
+    assert len(module.boundary_loops(faces[cavity])) == 3
+    closed = module.close_cavities(vertices, faces, cavity, mirror)
     assert_closed_and_symmetric(closed, mirror)
     assert not oriented(faces[~cavity]) - oriented(closed)
 
@@ -140,7 +140,7 @@ def test_a_filling_has_the_least_sum_of_squared_edges(load):
         diagonals = {tuple(sorted((t[k], t[k - 1]))) for t in triangles for k in range(3)}
         return sum(((vertices[a] - vertices[b]) ** 2).sum() for a, b in diagonals)
 
-    found = load("humans.caps").fill(vertices, loop)
+    found = load("humans.close_cavities").fill(vertices, loop)
     assert found.shape == (5, 3)
     every = triangulations(loop)
     assert len(every) == 42

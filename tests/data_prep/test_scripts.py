@@ -6,10 +6,10 @@ import sys
 
 import pytest
 
-from csm.data.folder import recognise
+from csm.data.registry import recognise
 from tests.conftest import ROOT, data_folder
 from tests.data import layouts
-from tests.data.test_folder import REAL
+from tests.data.real import REAL
 
 SCRIPTS = {
     "faust": "FAUST_6890",
@@ -65,8 +65,8 @@ def test_real_archives_are_laid_out(script, tmp_path, data_set, call):
     source = archive if archive and archive.is_file() else data_set(name)
     assert call(script, source, "--out", tmp_path) == 0
     laid = recognise(tmp_path / name)
-    kind, n_shapes, n_mapped, _, n_mapped_pairs, n_missing, n_template = REAL[name]
-    assert laid.kind is kind
-    assert (len(laid.names), len(laid.mapped), len(laid.missing)) == (n_shapes, n_mapped, n_missing)
-    assert len(laid.mapped_pairs) == n_mapped_pairs
-    assert laid.load(laid.mapped[-1]).truth.n_from == n_template
+    real = REAL[name]
+    assert laid.layout is real.layout
+    assert (len(laid.names), len(laid.mapped), len(laid.missing)) == (real.shapes, real.mapped, real.missing)
+    assert len(laid.mapped_pairs) == real.mapped_pairs
+    assert laid.load(laid.mapped[-1]).truth.n_from == real.template

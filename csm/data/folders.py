@@ -1,18 +1,46 @@
-"""A set of shapes in a folder: where meshes and maps are, read one shape at a time."""
+"""Sets of shapes in folders: the layouts in which they are published, and reading them one shape at a time."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from csm.data.kinds import Kind
-from csm.data.shapeset import Shape
+from csm.data.shapes import Shape
 from csm.errors import DataError
 from csm.mesh.correspondence import Direction, PointMap
-from csm.mesh.io import read_labels, read_mesh
+from csm.mesh.io import list_files, read_labels, read_mesh, read_pairs
 from csm.mesh.shape import Mesh
+
+PAIRS = "test_pairs.txt"
+"""File that lists the pairs of a set that are to be matched."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A layout in which a data set is published.
+
+    Parameters
+    ----------
+    key
+        Short name for options and tests.
+    title
+        What people call it.
+    origin
+        Where it comes from and on what terms; csm never downloads it.
+    find
+        Called with the layout and a folder; returns the set in the folder, or None if it has another layout.
+    """
+
+    key: str
+    title: str
+    origin: str
+    find: Callable[[Layout, Path], FolderSet | None] = field(repr=False)
+
+    def __call__(self, folder: Path) -> FolderSet | None:
+        """Return the set in a folder if the folder has this layout."""
+        return self.find(self, folder)
 
 
 @dataclass(frozen=True)
@@ -56,7 +84,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Missing:
-    """A file that the published set has and the folder has not, relative to the root, and where to get it."""
+    """A file of the published set that the folder lacks: its path relative to the root, and where to get it."""
 
     path: str
     origin: str
@@ -64,13 +92,13 @@ class Missing:
 
 @dataclass(frozen=True, eq=False)
 class FolderSet:
-    """A recognised set of shapes; nothing of it is read before it is asked for.
+    """A recognised set of shapes; a mesh or map is read when it is asked for.
 
     Parameters
     ----------
     name
         What results call the set: "FAUST_6890", "SCAPE_5000", or the folder's name for a plain folder.
-    kind
+    layout
         The layout that was recognised.
     root
         Folder that all paths lie in.
@@ -81,13 +109,13 @@ class FolderSet:
     lists
         Lists of names that the set ships, such as "train" and "test".
     missing
-        What the published set has and this folder has not.
+        Files of the published set that this folder lacks.
     extras
-        Files with pairs and lists, to be copied along.
+        Files with pairs and lists, which are copied with the shapes.
     """
 
     name: str
-    kind: Kind
+    layout: Layout
     root: Path
     entries: tuple[Entry, ...]
     pairs: tuple[tuple[str, str], ...] = ()
@@ -129,7 +157,7 @@ class FolderSet:
             return self._by_name[name]
         except KeyError:
             raise DataError(
-                f"{self.root}: there is no shape {name!r} among the {len(self.entries)} of this {self.kind.title} "
+                f"{self.root}: there is no shape {name!r} among the {len(self.entries)} of this {self.layout.title} "
                 f"folder ({', '.join(self.names[:3])}, ...)"
             ) from None
 
@@ -179,8 +207,8 @@ class FolderSet:
     def _identity(self, n: int, mesh: Mesh) -> PointMap:
         if mesh.n_vertices < n:
             raise DataError(
-                f"{self.entry(mesh.name).mesh}: has {mesh.n_vertices} vertices, but in a {self.kind.title} folder the "
-                f"first {n} are the template's; is it a remeshed or decimated copy?"
+                f"{self.entry(mesh.name).mesh}: has {mesh.n_vertices} vertices, but in a {self.layout.title} folder "
+                f"the first {n} are the template's; is it a remeshed or decimated copy?"
             )
         return PointMap.identity(n, mesh.n_vertices, mesh.name)
 
@@ -191,3 +219,76 @@ def _read_map(path: Path, mesh: Mesh) -> PointMap:
 
 def _same_connectivity(a: Mesh, b: Mesh) -> bool:
     return a.n_vertices == b.n_vertices and a.faces.shape == b.faces.shape and bool((a.faces == b.faces).all())
+
+
+def stems(files: Sequence[Path]) -> dict[str, Path]:
+    """Index files by name without suffix, in order.
+
+    Raises
+    ------
+    DataError
+        If two files have one name.
+    """
+    found: dict[str, Path] = {}
+    for path in files:
+        if path.stem in found:
+            raise DataError(f"{path} and {found[path.stem].name} have one name, so it is not clear which is the shape")
+        found[path.stem] = path
+    return found
+
+
+def exists(path: Path) -> bool:
+    """Tell whether a folder has this file; the listing of the folder is read once and kept."""
+    return path in list_files(path.parent, path.suffix)
+
+
+def listed_pairs(folder: Path) -> tuple[tuple[tuple[str, str], ...], tuple[Path, ...]]:
+    """Return the pairs that `test_pairs.txt` lists and, as the only extra, the file; both empty if there is no file."""
+    path = folder / PAIRS
+    return (tuple(read_pairs(path)), (path,)) if exists(path) else ((), ())
+
+
+def absent(
+    wanted: Iterable[str], found: Mapping[str, Path], place: Path, suffix: str, origin: str
+) -> tuple[Missing, ...]:
+    """Return the names without a file, as missing files of this suffix in `place`."""
+    return tuple(Missing((place / (name + suffix)).as_posix(), origin) for name in wanted if name not in found)
+
+
+def absent_files(paths: Iterable[Path], root: Path, origin: str) -> tuple[Missing, ...]:
+    """Return which of some files are missing."""
+    return tuple(Missing(path.relative_to(root).as_posix(), origin) for path in paths if not exists(path))
+
+
+def remeshed_set(
+    layout: Layout, folder: Path, name: str, template_of: Callable[[str], str], published: Sequence[str] = ()
+) -> FolderSet | None:
+    """Return a set in the layout of SGA18: `vtx_5k/NAME.off`, `vtx_5k/corres/NAME.vts`, `NAME.sym.vts`, test pairs.
+
+    Parameters
+    ----------
+    layout, folder
+        The layout, and the folder that may hold the set (or its `vtx_5k`).
+    name
+        What results call the set.
+    template_of
+        Name of a shape -> name of its template, for sets with several.
+    published
+        Names of all shapes as published, if they are known.
+    """
+    if folder.resolve().name == "vtx_5k":
+        folder = folder.resolve().parent
+    meshes = stems(list_files(folder / "vtx_5k", ".off"))
+    if not meshes:
+        return None
+    maps = stems(list_files(folder / "vtx_5k/corres", ".vts"))
+    entries = tuple(
+        Entry(stem, path, maps.get(stem), maps.get(f"{stem}.sym"), template_of(stem)) for stem, path in meshes.items()
+    )
+    pairs, extras = listed_pairs(folder)
+    wanted = list(dict.fromkeys([*meshes, *published, *(stem for pair in pairs for stem in pair)]))
+    missing = absent(wanted, meshes, Path("vtx_5k"), ".off", layout.origin)
+    both = [s for stem in wanted for s in (stem, f"{stem}.sym")]
+    missing += absent(both, maps, Path("vtx_5k/corres"), ".vts", layout.origin)
+    missing += absent_files([folder / PAIRS], folder, layout.origin)
+    return FolderSet(name, layout, folder, entries, pairs, missing=missing, extras=extras)

@@ -5,7 +5,7 @@ import os
 import pytest
 from threadpoolctl import threadpool_info
 
-from csm._processes import run_all
+from csm._parallel import in_fresh_process, parallel_map
 
 
 def square(x: int) -> int:
@@ -19,7 +19,7 @@ def process_and_threads(_: int) -> tuple[int, int]:
 
 
 def squares(tasks: list[int], workers: int) -> list[int]:
-    return run_all(square, tasks, str, workers, what="square", unit="number")
+    return parallel_map(square, tasks, str, workers, what="square", unit="number")
 
 
 @pytest.mark.parametrize("workers", [0, 1, 2])
@@ -35,6 +35,17 @@ def test_an_error_ends_the_run(workers):
 
 
 def test_workers_are_other_processes_of_one_thread():
-    found = run_all(process_and_threads, [0, 0], str, 2, what="ask", unit="worker")
+    found = parallel_map(process_and_threads, [0, 0], str, 2, what="ask", unit="worker")
     assert os.getpid() not in {process for process, _ in found}
     assert {threads for _, threads in found} == {1}
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_tasks_may_be_made_one_by_one(workers):
+    tasks = (x for x in [3, 1, 2])
+    assert parallel_map(square, tasks, str, workers, what="square", unit="number", total=3) == [9, 1, 4]
+
+
+def test_a_fresh_process_is_another_one():
+    process, _ = in_fresh_process(process_and_threads, 0)
+    assert process != os.getpid()

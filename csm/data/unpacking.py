@@ -1,4 +1,4 @@
-"""Take in a data set as its authors publish it: unpack, recognise, check, and lay out where csm finds it."""
+"""Unpack a published data set: recognise it, copy it to a folder where csm finds it, and check it."""
 
 from __future__ import annotations
 
@@ -8,11 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from csm.data.folder import find_sets, recognise
-from csm.data.folderset import FolderSet
+from csm.data.folders import FolderSet, Layout
 from csm.data.inspection import Inspected, inspect
-from csm.data.kinds import Kind
 from csm.data.prepare import Job, Recipe, Summary, prepare
+from csm.data.registry import find_sets, recognise
 from csm.data.store import Store
 from csm.descriptors.acd import ACD
 from csm.errors import CsmError, DataError
@@ -20,8 +19,8 @@ from csm.mesh.io import copy_file, unpacked
 
 
 @dataclass(frozen=True, eq=False)
-class TakenIn:
-    """A set in its new place, with what was found about each shape."""
+class Unpacked:
+    """A set in its new folder, with what was found about each shape."""
 
     shapes: FolderSet
     rows: tuple[Inspected, ...]
@@ -31,15 +30,15 @@ class TakenIn:
         noted = sum(bool(row.findings) for row in self.rows if row.usable)
         n_missing = len(self.shapes.missing)
         head = (
-            f"{self.shapes.root}: {self.shapes.kind.title}, {len(self.rows)} shapes, {len(self.shapes.mapped)} with "
+            f"{self.shapes.root}: {self.shapes.layout.title}, {len(self.rows)} shapes, {len(self.shapes.mapped)} with "
             f"correspondence, {noted} with notes, {len(self.rows) - sum(r.usable for r in self.rows)} unusable, "
             f"{n_missing} files missing" + (" (csm check lists them)" if n_missing else "")
         )
         return "\n".join([head, *bad])
 
 
-def take_in(source: Path, out: Path, kinds: Sequence[Kind], progress: bool = True) -> list[TakenIn]:
-    """Copy every set of the wanted kinds out of an archive or folder to `out/NAME`, and check it there.
+def unpack(source: Path, out: Path, layouts: Sequence[Layout], progress: bool = True) -> list[Unpacked]:
+    """Copy every set in one of the wanted layouts from an archive or folder to `out/NAME`, and check the copy.
 
     Parameters
     ----------
@@ -47,22 +46,22 @@ def take_in(source: Path, out: Path, kinds: Sequence[Kind], progress: bool = Tru
         Archive (.zip, .tar, .tar.xz, ...) or folder as published; it is only read.
     out
         Folder that gets one folder per set.
-    kinds
-        What to look for.
+    layouts
+        The wanted layouts.
     progress
         Show a progress bar with the shape's name.
 
     Raises
     ------
     DataError
-        If the source holds no set of these kinds, or `out/NAME` is the source itself.
+        If the source holds no set in these layouts, or `out/NAME` is the source itself.
     """
     with unpacked(source) as folder:
-        found = [shapes for shapes in find_sets(folder) if shapes.kind in kinds]
+        found = [shapes for shapes in find_sets(folder) if shapes.layout in layouts]
         if not found:
-            raise DataError(f"{source}: holds no {_any_of(kinds)}. Where to get it: {_origins(kinds)}")
+            raise DataError(f"{source}: holds no {_any_of(layouts)}. Where to get it: {_origins(layouts)}")
         placed = [lay_out(shapes, out / shapes.name) for shapes in found]
-    return [TakenIn(shapes, inspect(shapes, progress)) for shapes in placed]
+    return [Unpacked(shapes, inspect(shapes, progress)) for shapes in placed]
 
 
 def lay_out(shapes: FolderSet, target: Path) -> FolderSet:
@@ -78,7 +77,7 @@ def lay_out(shapes: FolderSet, target: Path) -> FolderSet:
             f"{target}: lies in the source folder {shapes.root}, which is not changed; choose another place"
         )
     if not shapes.entries:
-        raise DataError(f"{shapes.root}: this {shapes.kind.title} folder has no shapes; {shapes.kind.origin}")
+        raise DataError(f"{shapes.root}: this {shapes.layout.title} folder has no shapes; {shapes.layout.origin}")
     for path in shapes.files:
         copy_file(path, target / path.relative_to(shapes.root))
     return recognise(target)
@@ -87,20 +86,20 @@ def lay_out(shapes: FolderSet, target: Path) -> FolderSet:
 def fill_store(shapes: FolderSet, store: Store) -> Summary:
     """Compute what the paper's network needs, ACD and the eigenbasis, for all shapes with correspondence.
 
-    A command with other options asks for other descriptors; the store keeps both.
+    Commands that use other descriptors compute them when they run; the store keeps both.
     """
-    return prepare([Job(shapes, name) for name in shapes.mapped], Recipe(ACD()), store)
+    return prepare([Job(shapes, name) for name in shapes.mapped], [Recipe(ACD.paper())], store)
 
 
-def script(title: str, kinds: Sequence[Kind], argv: Sequence[str] | None = None) -> int:
-    """Run a script of `data_prep/`: parse the arguments, take the sets in, report.
+def script(title: str, layouts: Sequence[Layout], argv: Sequence[str] | None = None) -> int:
+    """Run a script of `data_prep/`: parse the arguments, unpack the sets, report.
 
     Parameters
     ----------
     title
         First line of the help.
-    kinds
-        What the script takes in.
+    layouts
+        The layouts that the script unpacks.
     argv
         Arguments; by default the process's.
 
@@ -111,24 +110,24 @@ def script(title: str, kinds: Sequence[Kind], argv: Sequence[str] | None = None)
     """
     parser = argparse.ArgumentParser(
         description=title,
-        epilog="csm downloads nothing. Where to get it: " + _origins(kinds),
+        epilog="csm downloads nothing. Where to get it: " + _origins(layouts),
     )
     parser.add_argument("source", nargs="+", type=Path, help="archives (.zip, .tar.xz, ...) or folders as published")
     parser.add_argument("--out", type=Path, required=True, help="folder that gets one folder per set")
-    parser.add_argument("--store", action="store_true", help="compute the paper's descriptors and bases, too")
+    parser.add_argument("--store", action="store_true", help="also compute the paper's descriptors and bases")
     options = parser.parse_args(argv)
     try:
-        taken = [t for source in options.source for t in take_in(source, options.out, kinds)]
-        for one in taken:
-            print(one)
-        filled = [fill_store(one.shapes, Store()) for one in taken if options.store]
+        unpacked_sets = [found for source in options.source for found in unpack(source, options.out, layouts)]
+        for found in unpacked_sets:
+            print(found)
+        filled = [fill_store(found.shapes, Store()) for found in unpacked_sets if options.store]
     except CsmError as error:
         print(f"{parser.prog}: {error}", file=sys.stderr)
         return 2
     for summary in filled:
         print(f"{summary.made} prepared, {summary.present} already in the store, {len(summary.failures)} failed")
         print(summary.table(), end="\n" if summary.failures else "")
-    good = all(row.usable for one in taken for row in one.rows) and not any(s.failures for s in filled)
+    good = all(row.usable for found in unpacked_sets for row in found.rows) and not any(s.failures for s in filled)
     return 0 if good else 1
 
 
@@ -136,9 +135,9 @@ def _why(row: Inspected) -> list[str]:
     return [*row.problems, *(finding.text for finding in row.findings if finding.severity == "error")]
 
 
-def _any_of(kinds: Sequence[Kind]) -> str:
-    return " or ".join(kind.title for kind in kinds) + " set"
+def _any_of(layouts: Sequence[Layout]) -> str:
+    return " or ".join(layout.title for layout in layouts) + " set"
 
 
-def _origins(kinds: Sequence[Kind]) -> str:
-    return "; ".join(f"{kind.title}: {kind.origin}" for kind in kinds)
+def _origins(layouts: Sequence[Layout]) -> str:
+    return "; ".join(f"{layout.title}: {layout.origin}" for layout in layouts)

@@ -3,9 +3,11 @@ import tarfile
 
 import pytest
 
-from csm.data.folder import recognise
-from csm.data.intake import lay_out, script, take_in
-from csm.data.kinds import ACD_SCAPE, SGA18_TOSCA, SHREC19
+from csm.data.registry import recognise
+from csm.data.scape import RELEASE
+from csm.data.shrec19 import REMESHED
+from csm.data.tosca import SGA18
+from csm.data.unpacking import lay_out, script, unpack
 from csm.errors import DataError
 from csm.mesh.io import write_mesh
 from tests.data import layouts
@@ -19,36 +21,36 @@ def contents(folder):
 def test_a_download_is_found_copied_and_recognised(tmp_path):
     layouts.acd(tmp_path / "in" / "repo" / "datasets" / "SCAPE")
     before = contents(tmp_path / "in")
-    (taken,) = take_in(tmp_path / "in", tmp_path / "out", [ACD_SCAPE], progress=False)
-    assert taken.shapes.root == tmp_path / "out" / "SCAPE_5000"
+    (found,) = unpack(tmp_path / "in", tmp_path / "out", [RELEASE], progress=False)
+    assert found.shapes.root == tmp_path / "out" / "SCAPE_5000"
     assert contents(tmp_path / "out" / "SCAPE_5000") == contents(tmp_path / "in" / "repo" / "datasets" / "SCAPE")
     assert contents(tmp_path / "in") == before
-    assert "2 shapes, 2 with correspondence" in str(taken)
-    assert all(row.usable for row in taken.rows)
+    assert "2 shapes, 2 with correspondence" in str(found)
+    assert all(row.usable for row in found.rows)
 
 
 def test_only_what_belongs_to_the_set_is_copied(tmp_path):
     layouts.sga18(tmp_path / "in")
     (tmp_path / "in" / "virus.exe").write_text("")
-    take_in(tmp_path / "in", tmp_path / "out", [SGA18_TOSCA], progress=False)
+    unpack(tmp_path / "in", tmp_path / "out", [SGA18], progress=False)
     copied = {str(p) for p in contents(tmp_path / "out" / "TOSCA_5k_remeshed")}
     assert "test_pairs.txt" in copied
     assert "virus.exe" not in copied
     assert len(copied) == 1 + 3 * 3
 
 
-def test_archives_are_taken_in(tmp_path):
+def test_archives_are_unpacked(tmp_path):
     layouts.shrec19(tmp_path / "in")
     with tarfile.open(tmp_path / "set.tar.xz", "w:xz") as archive:
         archive.add(tmp_path / "in", "anything")
-    (taken,) = take_in(tmp_path / "set.tar.xz", tmp_path / "out", [SHREC19], progress=False)
-    assert taken.shapes.names == ("1", "2", "10")
+    (found,) = unpack(tmp_path / "set.tar.xz", tmp_path / "out", [REMESHED], progress=False)
+    assert found.shapes.names == ("1", "2", "10")
 
 
 def test_another_set_is_refused_with_the_address(tmp_path):
     layouts.shrec19(tmp_path / "in")
     with pytest.raises(DataError, match=r"holds no ACD release, SCAPE set.*https://github\.com/Wang-Chen9"):
-        take_in(tmp_path / "in", tmp_path / "out", [ACD_SCAPE], progress=False)
+        unpack(tmp_path / "in", tmp_path / "out", [RELEASE], progress=False)
     assert not (tmp_path / "out").exists()
 
 
@@ -66,26 +68,26 @@ def test_script_fills_the_store_once(tmp_path, capsys, monkeypatch):
         (tmp_path / "in" / "vtx_5k" / "corres" / f"{name}.vts").unlink()
     write_mesh(tmp_path / "in" / "vtx_5k" / "cat0.off", blob(3))
     arguments = [str(tmp_path / "in"), "--out", str(tmp_path / "out"), "--store"]
-    assert script("A title.", [SGA18_TOSCA], arguments) == 0
+    assert script("A title.", [SGA18], arguments) == 0
     assert "1 prepared, 0 already" in capsys.readouterr().out
-    assert script("A title.", [SGA18_TOSCA], arguments) == 0
+    assert script("A title.", [SGA18], arguments) == 0
     assert "0 prepared, 1 already" in capsys.readouterr().out
 
 
 def test_script_status_tells_unusable_shapes_from_errors(tmp_path, capsys):
     layouts.sga18(tmp_path / "in")
     (tmp_path / "in" / "vtx_5k" / "cat0.off").write_text("nonsense")
-    assert script("A title.", [SGA18_TOSCA], [str(tmp_path / "in"), "--out", str(tmp_path / "out")]) == 1
+    assert script("A title.", [SGA18], [str(tmp_path / "in"), "--out", str(tmp_path / "out")]) == 1
     assert "cat0.off" in capsys.readouterr().out
-    assert script("A title.", [SGA18_TOSCA], [str(tmp_path / "nowhere"), "--out", str(tmp_path / "out")]) == 2
+    assert script("A title.", [SGA18], [str(tmp_path / "nowhere"), "--out", str(tmp_path / "out")]) == 2
     assert "no such file" in capsys.readouterr().err
 
 
-def test_taking_in_twice_gives_the_same(tmp_path):
+def test_unpacking_twice_gives_the_same(tmp_path):
     layouts.sga18(tmp_path / "in")
-    take_in(tmp_path / "in", tmp_path / "out", [SGA18_TOSCA], progress=False)
+    unpack(tmp_path / "in", tmp_path / "out", [SGA18], progress=False)
     first = contents(tmp_path / "out")
-    take_in(tmp_path / "in", tmp_path / "out", [SGA18_TOSCA], progress=False)
+    unpack(tmp_path / "in", tmp_path / "out", [SGA18], progress=False)
     assert contents(tmp_path / "out") == first
     shutil.rmtree(tmp_path / "in")
     assert recognise(tmp_path / "out" / "TOSCA_5k_remeshed").load("cat0").truth.n_from == 30

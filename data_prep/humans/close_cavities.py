@@ -1,4 +1,4 @@
-"""Close the mouth and the eye sockets of the template: cut the cavities off and fill their rims."""
+"""Close the mouth and the eye sockets of the template: cut the cavities off and triangulate their rims."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def cap(vertices: Floats, faces: Ints, cavity: NDArray[np.bool_], mirror: Ints) -> Ints:
+def close_cavities(vertices: Floats, faces: Ints, cavity: NDArray[np.bool_], mirror: Ints) -> Ints:
     """Return the faces without those marked in `cavity`, their rims filled symmetrically; vertex numbers stay.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Delaunay flips of one connectivity under many shapes at once, in mirrored pairs."""
+"""Flips of edges towards a Delaunay triangulation: one connectivity for many shapes at once, in mirrored pairs."""
 
 from __future__ import annotations
 

@@ -1,0 +1,168 @@
+"""The data module that every data set derives from, and what the file of a data set declares.
+
+Nothing here needs PyTorch or Lightning; `csm.learning.loading` turns a data module into what Lightning's trainer takes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from csm.data.folders import Layout
+from csm.data.prepare import Job, Prepared, Recipe, is_prepared, prepare, prepare_mesh
+from csm.data.shapes import InMemory, Shape, ShapeSet
+from csm.data.splits import Split
+from csm.data.store import Store
+from csm.descriptors.base import Descriptor
+from csm.errors import CsmError, DataError
+from csm.operators.stencils import Stencil
+
+
+class DataModule:
+    """Base class of the data modules: a training set, any number of test sets over the same template, one split.
+
+    Parameters
+    ----------
+    train_set
+        Set that the training and validation shapes come from.
+    test_sets
+        Sets to test on; results call each by its name, so the names differ.
+    split
+        Which shapes train and which test.
+    descriptor
+        Gives the input features.
+    basis_k
+        Eigenpairs kept per shape; a network may use fewer.
+    holdout
+        How many shapes, the last of the training list, are held out of the fit to validate on.  With 0 the last ten
+        training shapes serve for validation although they are fitted, and the validation error says little more than
+        that the training runs.
+    store
+        Where features and bases are kept.
+    workers
+        Processes for the preparation and for the distances of tests, see `csm._parallel.n_processes`.
+    stencils
+        What else the network needs of a shape, see `csm.operators.stencils`.
+
+    Raises
+    ------
+    DataError
+        If two test sets have one name, or no training shape is left to fit.
+    """
+
+    def __init__(
+        self,
+        train_set: ShapeSet,
+        test_sets: Sequence[ShapeSet],
+        split: Split,
+        *,
+        descriptor: Descriptor,
+        basis_k: int = 128,
+        holdout: int = 0,
+        store: Store | None = None,
+        workers: int | None = None,
+        stencils: Sequence[Stencil] = (),
+    ) -> None:
+        self.train_set, self.split, self.holdout, self.workers = train_set, split, holdout, workers
+        self.test_sets: Mapping[str, ShapeSet] = _by_name(test_sets)
+        self.recipe = Recipe(descriptor, basis_k, tuple(stencils))
+        self.store = store or Store()
+        self.fit_names, held_out = split.held_out(holdout)
+        self.validation_names = held_out or split.train[-10:]
+        self._shapes: dict[str, Shape] = {}
+
+    @property
+    def protocol(self) -> str:
+        """One sentence for logs and results: what is fitted and what is validated on."""
+        seen = f"the last {len(self.validation_names)} training shapes, which are also fitted"
+        held = f"{self.holdout} held-out training shapes"
+        return (
+            f"split {self.split.label}; fitted on {len(self.fit_names)} shapes of {self.train_set.name}, "
+            f"validated on {held if self.holdout else seen}"
+        )
+
+    def train_names(self) -> tuple[str, ...]:
+        """Return the names of the split's training shapes; DataError if the set lacks one."""
+        self.split.require(self.train_set.names, self.train_set.name, "train")
+        return self.split.train
+
+    def test_names(self, shapes: ShapeSet) -> tuple[str, ...]:
+        """Return the names of the split's test shapes; DataError if the set lacks one."""
+        self.split.require(shapes.names, shapes.name, "test")
+        return self.split.test
+
+    def shape(self, name: str) -> Shape:
+        """Return a training shape; it is read once and stays in memory."""
+        if name not in self._shapes:
+            self._shapes[name] = self.train_set.load(name)
+        return self._shapes[name]
+
+    def prepare(self) -> None:
+        """Compute what the store lacks of the training shapes.
+
+        Every shape is read once, here, and handed to the processes that prepare it.
+
+        Raises
+        ------
+        DataError
+            With a table of the shapes that cannot be used, if there are any.
+        """
+        names = self.train_names()
+        jobs = [job for name in names if (job := self._missing(name)) is not None]
+        if not jobs:
+            return
+        summary = prepare(jobs, [self.recipe], self.store, workers=self.workers)
+        if summary.failures:
+            raise DataError(f"{len(summary.failures)} of {len(names)} shapes cannot be used:\n{summary.table()}")
+
+    def _missing(self, name: str) -> Job | None:
+        """Return what remains to be prepared of a training shape, or None if the store has everything."""
+        try:
+            shape = self.shape(name)
+            if is_prepared(shape.mesh, self.recipe, self.store):
+                return None
+        except CsmError:
+            return Job(self.train_set, name)  # the preparation fails in the same way and reports it with all others
+        return Job(InMemory([shape], self.train_set.name), name)
+
+    def prepared(self, name: str) -> Prepared:
+        """Return features, basis and stencils of a training shape; what the store lacks is computed."""
+        return prepare_mesh(self.shape(name).mesh, self.recipe, self.store)
+
+    @property
+    def n_classes(self) -> int:
+        """Number of template points."""
+        return self.shape(self.fit_names[0]).truth.n_from
+
+    def validation_shapes(self) -> list[Shape]:
+        """Return the meshes and truths of the validation shapes."""
+        return [self.shape(name) for name in self.validation_names]
+
+
+def _by_name(sets: Sequence[ShapeSet]) -> dict[str, ShapeSet]:
+    named = {shapes.name: shapes for shapes in sets}
+    if len(named) != len(sets):
+        raise DataError(
+            f"the {len(sets)} test sets have only {len(named)} different names ({', '.join(named)}), by which results "
+            "call them; rename the folders or name each set once"
+        )
+    return named
+
+
+@dataclass(frozen=True)
+class DataSet:
+    """What the file of one data set declares, for `csm.data.registry`.
+
+    Parameters
+    ----------
+    module
+        The class of its data module.
+    layouts
+        The layouts in which it is published, in the order in which they are tried on a folder.
+    splits
+        The splits that it is used with; options call them by their names.
+    """
+
+    module: Callable[..., DataModule]
+    layouts: tuple[Layout, ...] = ()
+    splits: tuple[Split, ...] = ()
