@@ -22,7 +22,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 from torch.nn import functional as F
 
-from csm.evaluation.matching import nearest
+from csm.matching.nearest import nearest
 
 N, D = 6890, 256
 REFERENCE = "torch.cdist + argmin"

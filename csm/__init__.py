@@ -18,42 +18,68 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from csm.data.humans import load_humans
-    from csm.descriptors import ACD, HKS, WKS
-    from csm.evaluation.matching import Match, match_features
+    from csm.data.registry import find_set, recognise
+    from csm.data.store import Store
+    from csm.descriptors import ACD, HKS, WKS, preset
+    from csm.evaluation.engine import evaluate
+    from csm.evaluation.protocol import EvaluationProtocol
+    from csm.evaluation.results import Evaluation
+    from csm.matching import Match, VertexMap, match_features, match_meshes
+    from csm.matching.network import load_model
     from csm.mesh import Mesh, PointMap, read_mesh, write_mesh
     from csm.mesh.check import check
     from csm.operators import Operators
     from csm.operators.geodesic import geodesics
 
-__all__ = [
-    "ACD",
-    "HKS",
-    "WKS",
-    "Match",
-    "Mesh",
-    "Operators",
-    "PointMap",
-    "check",
-    "geodesics",
-    "load_humans",
-    "match_features",
-    "read_mesh",
-    "write_mesh",
-]
-
-_HOME = {
+_PLACES = {
     "csm.data.humans": ("load_humans",),
-    "csm.descriptors": ("ACD", "HKS", "WKS"),
-    "csm.evaluation.matching": ("Match", "match_features"),
+    "csm.data.registry": ("find_set", "recognise"),
+    "csm.data.store": ("Store",),
+    "csm.descriptors": ("ACD", "HKS", "WKS", "preset"),
+    "csm.evaluation.engine": ("evaluate",),
+    "csm.evaluation.protocol": ("EvaluationProtocol",),
+    "csm.evaluation.results": ("Evaluation",),
+    "csm.matching": ("Match", "VertexMap", "match_features", "match_meshes"),
+    "csm.matching.network": ("load_model",),
     "csm.mesh": ("Mesh", "PointMap", "read_mesh", "write_mesh"),
     "csm.mesh.check": ("check",),
     "csm.operators": ("Operators",),
     "csm.operators.geodesic": ("geodesics",),
 }
 
+__all__ = [
+    "ACD",
+    "HKS",
+    "WKS",
+    "Evaluation",
+    "EvaluationProtocol",
+    "Match",
+    "Mesh",
+    "Operators",
+    "PointMap",
+    "Store",
+    "VertexMap",
+    "check",
+    "evaluate",
+    "find_set",
+    "geodesics",
+    "load_humans",
+    "load_model",
+    "match_features",
+    "match_meshes",
+    "preset",
+    "read_mesh",
+    "recognise",
+    "write_mesh",
+]
+
 
 def __getattr__(name: str) -> Any:
-    for module, names in _HOME.items():
+    for module, names in _PLACES.items():
         if name in names:
             return getattr(import_module(module), name)
     raise AttributeError(f"module 'csm' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

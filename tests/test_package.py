@@ -19,5 +19,17 @@ def test_an_unknown_name_is_an_attribute_error():
 
 
 def test_operators_and_descriptors_do_not_load_torch():
-    code = "import sys, csm, csm.data.prepare; csm.ACD; csm.Operators; sys.exit('torch' in sys.modules)"
+    code = "import sys, csm, csm.data.prepare; csm.ACD; csm.Operators; csm.find_set; sys.exit('torch' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_matching_and_evaluation_do_not_load_lightning_or_hydra():
+    code = (
+        "import sys, csm; csm.match_meshes; csm.evaluate; csm.preset; csm.load_humans; "
+        "sys.exit(bool({'lightning', 'hydra'} & set(sys.modules)))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_public_names_are_listed():
+    assert {*csm.__all__} <= {*dir(csm)}

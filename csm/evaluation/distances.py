@@ -1,40 +1,61 @@
-"""How far matches on one target shape are from the truth; geodesic work is shared between all its source shapes."""
+"""How far matches on one target shape are from the truth; all sources, methods and matchers share the geodesic work.
+
+With ``exact_points`` of the protocol only some points are measured exactly.  The exact distances that twelve
+descriptors ask for on a target of 5000 vertices take a minute, although each true vertex is propagated from once for
+all of them: descriptors of which some take left for right ask for far vertices from almost every point, so stopping
+early saves little.  A shortest path along edges costs 1 ms, or 4 s for all.  It is 4 to 6 % too long, by much the same
+factor everywhere: after scaling, what is left has a standard deviation of 0.003 to 0.013 of the diameter.  So all
+points are measured along edges and scaled by the ratio of exact to edge distances where both are known, one ratio per
+method and target (the ratio estimator of survey sampling, Cochran, "Sampling techniques", 1977, chapter 6);
+`PointErrors.variance` says what that leaves uncertain.  On a pair of FAUST, means of 13 to 158 thousandths were off by
+0.13 on average with 100 exact points, at a twelfth of the cost.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from csm._types import BoolArray, FloatArray, IntArray
+from csm.evaluation.geodesic_rows import StoredGeodesics
 from csm.evaluation.metrics import FLIP_MARGIN, flipped
-from csm.evaluation.remembered import RememberedGeodesics
 from csm.mesh.shape import Mesh
-from csm.operators.geodesic import Geodesics, Method, geodesics
-from csm.operators.operators import Memo
+from csm.operators import Memo
+from csm.operators.geodesic import Geodesics, geodesics
+from csm.operators.geodesic import Method as Distance
 
-KEPT_POINTS = 500
+STORED_POINTS = 500
 """Rows of so many points are kept at most: at 15,000 vertices 30 MB per shape."""
 
 
 @dataclass(frozen=True, eq=False)
 class MatchedPoints:
-    """P points of one source shape on the target.
+    """P points of one source shape on the target, matched by one method.
 
     Parameters
     ----------
+    source
+        Shape (P,), vertices of the source.
     truth
         Shape (P,), the target vertices where the points belong.
     matched
         Shape (P,), the target vertices that they were matched to.
+    exact
+        Shape (P,), which of them are to be measured exactly.
     mirror
         Shape (P,), where they belong on the left-right flipped target, -1 if unknown; None if no flip is known.
+    group
+        What the points belong to, such as a method: those of one group share the scale of distances along edges.
     """
 
+    source: IntArray
     truth: IntArray
     matched: IntArray
+    exact: BoolArray
     mirror: IntArray | None = None
+    group: Hashable = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,14 +67,17 @@ class PointErrors:
     distance
         Shape (P,), from the true vertex to the matched one; the diameter where no path joins them.
     flip
-        Shape (P,), whether the match is a left-right flip; None if no flip is known.
+        Whether the match is a left-right flip, for the points that are measured exactly; None if no flip is known.
     unreachable
         Number of points whose match no path joins to the truth.
+    variance
+        Of the mean distance, due to the points that are not measured exactly.
     """
 
     distance: FloatArray
     flip: BoolArray | None
     unreachable: int
+    variance: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -66,79 +90,117 @@ class Lengths:
 
 @dataclass(frozen=True, eq=False)
 class TargetErrors:
-    """Errors of all source shapes on one target, in the order they were asked for."""
+    """Errors of all matches on one target, in the order they were asked for."""
 
     lengths: Lengths
     errors: tuple[PointErrors, ...]
 
 
 def target_errors(
-    mesh: Mesh, method: Method, normaliser: str, sources: Sequence[MatchedPoints], memo: Memo | None = None
+    mesh: Mesh, matches: Sequence[MatchedPoints], distance: Distance, normaliser: str, memo: Memo | None = None
 ) -> TargetErrors:
-    """Measure the matches of several source shapes on one target.
+    """Measure matches of several sources and methods on one target.
 
-    Only pairs of vertices that were missed are measured, from the true vertex to the matched one, each pair once.
+    Equal pairs of vertices, and points with the same true vertex, share their work.
 
     Parameters
     ----------
     mesh
         The target shape.
-    method
+    matches
+        What to measure.
+    distance
         Kind of distance, also of the diameter.
     normaliser
         Field of `Lengths` that the margin of a flip (`metrics.FLIP_MARGIN`) is a fraction of.
-    sources
-        Matches of each source shape.
     memo
-        Where distances from the points are kept for the next question, if there are at most `KEPT_POINTS` of them.
+        Where distances from the points are kept for the next question, if there are at most `STORED_POINTS` of them.
+
+    Raises
+    ------
+    MeshError
+        If the target is not a manifold, which exact distances need.
     """
-    surface: Geodesics = geodesics(mesh, method)
-    if memo is not None and len(np.unique(np.concatenate([p.truth for p in sources]))) <= KEPT_POINTS:
-        surface = RememberedGeodesics(surface, mesh, memo)
+    surface: Geodesics = geodesics(mesh, distance)
+    measured = [m.exact for m in matches]
+    if memo is not None and len(_unique([m.truth[m.exact] for m in matches])) <= STORED_POINTS:
+        surface = StoredGeodesics(surface, mesh, memo)
     lengths = Lengths(surface.diameter(), float(np.sqrt(mesh.area)))
     margin = FLIP_MARGIN * float(getattr(lengths, normaliser))
-    missed = [p.truth != p.matched for p in sources]
-    found = _distances(
-        surface,
-        [(p.truth[m], p.matched[m]) for p, m in zip(sources, missed, strict=True)],
-    )
-    distances = [_spread(m, d) for m, d in zip(missed, found, strict=True)]
-    flips = _flips(surface, sources, distances, margin)
-    return TargetErrors(
-        lengths,
-        tuple(
-            PointErrors(np.minimum(d, max(lengths.diameter, _largest(d))), flip, int(np.isinf(d).sum()))
-            for d, flip in zip(distances, flips, strict=True)
-        ),
-    )
+    exact = _distances(surface, matches, measured)
+    if all(where.all() for where in measured):
+        along, flip_surface = exact, surface
+        ratios: Mapping[Hashable, float] = {m.group: 1.0 for m in matches}
+    else:
+        flip_surface = geodesics(mesh, "edge")
+        along = _distances(flip_surface, matches, [np.ones(len(where), dtype=bool) for where in measured])
+        ratios = _ratios(matches, exact, along)
+    scaled = [ratios[m.group] * a for m, a in zip(matches, along, strict=True)]
+    flips = _flips(flip_surface, matches, scaled, ratios, margin)
+    joined = zip(matches, exact, scaled, flips, strict=True)
+    return TargetErrors(lengths, tuple(_joined(*parts, lengths.diameter) for parts in joined))
 
 
-def _distances(surface: Geodesics, questions: Sequence[tuple[IntArray, IntArray]]) -> list[FloatArray]:
-    ends = np.cumsum([len(a) for a, _ in questions])[:-1]
-    starts, stops = (np.concatenate([q[side] for q in questions]) for side in (0, 1))
-    return np.split(surface.pairs(starts, stops), ends)
+def _unique(parts: Sequence[IntArray]) -> IntArray:
+    return np.unique(np.concatenate(parts)) if parts else np.empty(0, dtype=np.int64)
 
 
-def _spread(where: BoolArray, values: FloatArray) -> FloatArray:
-    out = np.zeros(len(where))
-    out[where] = values
-    return out
+def _distances(surface: Geodesics, matches: Sequence[MatchedPoints], where: Sequence[BoolArray]) -> list[FloatArray]:
+    """Return the distances from the true to the matched vertices, 0 elsewhere than at `where`."""
+    missed = [w & (m.truth != m.matched) for m, w in zip(matches, where, strict=True)]
+    return _between(surface, [m.truth for m in matches], [m.matched for m in matches], missed)
 
 
-def _largest(distances: FloatArray) -> float:
-    return float(distances[np.isfinite(distances)].max(initial=0.0))
+def _between(
+    surface: Geodesics, starts: Sequence[IntArray], stops: Sequence[IntArray], where: Sequence[BoolArray]
+) -> list[FloatArray]:
+    mask = np.concatenate(where)
+    found = np.zeros(len(mask))
+    found[mask] = surface.pairs(np.concatenate(starts)[mask], np.concatenate(stops)[mask])
+    return np.split(found, np.cumsum([len(w) for w in where])[:-1])
+
+
+def _ratios(
+    matches: Sequence[MatchedPoints], exact: Sequence[FloatArray], along: Sequence[FloatArray]
+) -> Mapping[Hashable, float]:
+    """Return by group the sum of exact distances over that of edge paths, where both are known."""
+    sums = {m.group: np.zeros(2) for m in matches}
+    for m, e, a in zip(matches, exact, along, strict=True):
+        both = m.exact & np.isfinite(a)
+        sums[m.group] += e[both].sum(), a[both].sum()
+    total = np.sum(list(sums.values()), axis=0)
+    return {
+        name: float(over[0] / over[1] if over[1] > 0 else total[0] / total[1] if total[1] > 0 else 1.0)
+        for name, over in sums.items()
+    }
 
 
 def _flips(
-    surface: Geodesics, sources: Sequence[MatchedPoints], distances: Sequence[FloatArray], margin: float
+    surface: Geodesics,
+    matches: Sequence[MatchedPoints],
+    scaled: Sequence[FloatArray],
+    ratios: Mapping[Hashable, float],
+    margin: float,
 ) -> list[BoolArray | None]:
-    """Measure the distance from the mirrored truth where the miss is large enough for a flip."""
-    mirrors = [np.full(len(p.truth), -1) if p.mirror is None else p.mirror for p in sources]
-    far = [(d > margin) & (mirror >= 0) for d, mirror in zip(distances, mirrors, strict=True)]
-    found = _distances(surface, [(m[f], p.matched[f]) for p, m, f in zip(sources, mirrors, far, strict=True)])
+    """Tell the left-right flips among the points measured exactly, where the miss is large enough for a flip."""
+    mirrors = [np.full(len(m.truth), -1) if m.mirror is None else m.mirror for m in matches]
+    far = [m.exact & (s > margin) & (mirror >= 0) for m, s, mirror in zip(matches, scaled, mirrors, strict=True)]
+    found = _between(surface, mirrors, [m.matched for m in matches], far)
     flips: list[BoolArray | None] = []
-    for points, distance, where, from_mirror in zip(sources, distances, far, found, strict=True):
-        flip = np.zeros(len(distance), dtype=bool)
-        flip[where] = flipped(distance[where], from_mirror, margin)
-        flips.append(None if points.mirror is None else flip)
+    for m, distance, where, from_mirror in zip(matches, scaled, far, found, strict=True):
+        flip = where & flipped(distance, ratios[m.group] * from_mirror, margin)
+        flips.append(None if m.mirror is None else flip[m.exact])
     return flips
+
+
+def _joined(
+    match: MatchedPoints, exact: FloatArray, scaled: FloatArray, flip: BoolArray | None, diameter: float
+) -> PointErrors:
+    distance = np.where(match.exact, exact, scaled)
+    known = np.isfinite(distance)
+    worst = max(diameter, float(distance[known].max(initial=0.0)))
+    sampled = match.exact & known
+    residual, n = exact[sampled] - scaled[sampled], int(match.exact.sum())
+    spread = 0.0 if match.exact.all() or residual.size == 0 else float((residual**2).mean())
+    variance = spread / max(n, 1) * (1 - n / len(distance))
+    return PointErrors(np.minimum(distance, worst), flip, int((~known).sum()), variance)

@@ -1,31 +1,19 @@
-"""Which pairs of shapes are compared, how far a miss is, and by what it is divided; and the evaluation that follows."""
+"""Which pairs of shapes and which points are compared, how far a miss is, and by what it is divided."""
 
 from __future__ import annotations
 
 import itertools
-import multiprocessing
-import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any, Literal, TypeAlias, get_args
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
-from threadpoolctl import threadpool_limits
-from tqdm import tqdm
 
-from csm._progress import progress_bar
-from csm._types import IntArray
-from csm.data.shapeset import Shape
+from csm._types import BoolArray, IntArray
 from csm.errors import ConfigError, DataError
-from csm.evaluation.distances import MatchedPoints, TargetErrors, target_errors
 from csm.evaluation.metrics import FLIP_MARGIN
-from csm.evaluation.results import Evaluation, PairErrors, summarise
-from csm.mesh.correspondence import ground_truth
-from csm.operators.geodesic import Method
-from csm.operators.operators import Memo
+from csm.mesh.correspondence import PointMap
+from csm.operators.geodesic import Method as Distance
 
 Normaliser: TypeAlias = Literal["diameter", "sqrt_area"]
 Pair: TypeAlias = tuple[str, str]
@@ -40,8 +28,24 @@ _NORMALISERS = {
 }
 
 
+@dataclass(frozen=True, eq=False)
+class MeasuredPoints:
+    """The P template points that are measured on a pair.
+
+    Parameters
+    ----------
+    template
+        Shape (P,), ascending.
+    exact
+        Shape (P,), which of them are measured exactly.
+    """
+
+    template: IntArray
+    exact: BoolArray
+
+
 @dataclass(frozen=True)
-class Protocol:
+class EvaluationProtocol:
     """The facts that a number needs beside it.
 
     Parameters
@@ -59,35 +63,50 @@ class Protocol:
         Kind of distance between the true and the matched vertex; see `csm.operators.geodesic`.
     normaliser
         What distances are divided by: "diameter" (the ACD paper) or "sqrt_area" (functional maps).
+    exact_points
+        How many template points are measured exactly on each target, the others along edges and scaled (see
+        `csm.evaluation.distances`); None for all.
+    drawn
+        Which points are drawn: "template", the same ones of the template in every pair; or "pair", among those that the
+        two shapes have in common and that a perturbation has left.
     """
 
     pairs: Literal["all"] | Sequence[Pair] = "all"
     sample: int | None = None
     points: int | None = None
     seed: int = 0
-    distance: Method = "exact"
+    distance: Distance = "exact"
     normaliser: Normaliser = "diameter"
+    exact_points: int | None = None
+    drawn: Literal["template", "pair"] = "template"
 
     def __post_init__(self) -> None:
         for what, value, known in (
-            ("distance", self.distance, get_args(Method)),
+            ("distance", self.distance, get_args(Distance)),
             ("normaliser", self.normaliser, get_args(Normaliser)),
+            ("drawn", self.drawn, ("template", "pair")),
         ):
             if value not in known:
                 raise ConfigError(f"protocol: {what}={value!r} is unknown; choose one of {', '.join(known)}")
         if isinstance(self.pairs, str) and self.pairs != "all":
             raise ConfigError(f'protocol: pairs={self.pairs!r} is unknown; wanted "all" or a list of name pairs')
-        if self.sample is not None and self.sample < 1:
-            raise ConfigError(f"protocol: sample={self.sample}; wanted a number of pairs from 1, or none for all")
-        if self.points is not None and self.points < 1:
-            raise ConfigError(f"protocol: points={self.points}; wanted a number of points from 1, or none for all")
+        for what, count in (("sample", self.sample), ("points", self.points), ("exact_points", self.exact_points)):
+            if count is not None and count < 1:
+                raise ConfigError(f"protocol: {what}={count}; wanted a number from 1, or none for all")
+        if self.exact_points is not None and self.distance != "exact":
+            raise ConfigError(f"protocol: exact_points={self.exact_points} goes with distance=exact only")
+        if self.exact_points is not None and self.points is not None and self.drawn == "pair":
+            raise ConfigError(
+                f"protocol: exact_points={self.exact_points} are drawn on the template, so points={self.points} have "
+                "to be as well: drawn=template"
+            )
 
     def choose(self, names: Sequence[str]) -> list[Pair]:
         """Return the (source, target) pairs to evaluate among shapes of these names.
 
         Examples
         --------
-        >>> Protocol().choose(["a", "b"])
+        >>> EvaluationProtocol().choose(["a", "b"])
         [('a', 'b'), ('b', 'a')]
         """
         if isinstance(self.pairs, str):
@@ -104,151 +123,66 @@ class Protocol:
             pairs = [pairs[i] for i in sorted(kept)]
         return pairs
 
+    def points_of(self, source: PointMap, target: PointMap, left: BoolArray | None = None) -> MeasuredPoints:
+        """Return which template points of a pair are measured, and which of these exactly.
+
+        Parameters
+        ----------
+        source, target
+            Maps from the template, shape (T,), to the vertices of the two shapes; -1 where a point is not known.
+        left
+            Shape (N_target,), which vertices a perturbation has left of the target; None for all.
+        """
+        s, t = source.indices, target.indices
+        known = (s >= 0) & (t >= 0)
+        if left is not None:
+            known[known] = left[t[known]]
+        chosen = known.copy()
+        if self.points is not None and self.drawn == "pair":
+            common = np.flatnonzero(known)
+            chosen[:] = False
+            chosen[common[self._order(len(common))[: self.points]]] = True
+        elif self.points is not None and self.points < len(t):
+            chosen[self._order(len(t))[self.points :]] = False
+        exact = chosen
+        if self.exact_points is not None:
+            order = self._order(len(t))
+            exact = np.zeros_like(chosen)
+            exact[order[(t >= 0)[order]][: self.exact_points]] = True
+            exact &= chosen
+        return MeasuredPoints(np.flatnonzero(chosen), exact[chosen])
+
+    def _order(self, n: int) -> IntArray:
+        return np.random.default_rng(self.seed).permutation(n)
+
     def _points(self) -> str:
-        return "all" if self.points is None else f"those of {self.points} (drawn with seed {self.seed})"
+        if self.points is None:
+            return "all template points known on both shapes"
+        if self.drawn == "pair":
+            return f"{self.points} of the template points known on both shapes (drawn with seed {self.seed})"
+        return f"those of {self.points} (drawn with seed {self.seed}) template points known on both shapes"
 
     def describe(self, n_pairs: int | None = None) -> str:
         """Say the protocol in words, for captions and result files.
 
         Examples
         --------
-        >>> Protocol(sample=50, seed=1, distance="edge", normaliser="sqrt_area").describe()[:58]
+        >>> EvaluationProtocol(sample=50, seed=1, distance="edge", normaliser="sqrt_area").describe()[:58]
         '50 pairs (drawn with seed 1 from all ordered pairs without'
         """
         which = "all ordered pairs without self-pairs" if self.pairs == "all" else "a given list of pairs"
         if self.sample is not None:
             which = f"drawn with seed {self.seed} from {which}"
             n_pairs = self.sample if n_pairs is None else n_pairs
+        scaled = (
+            ""
+            if self.exact_points is None
+            else f", of which {self.exact_points} per target exactly and the others by scaled paths along edges"
+        )
         return (
             f"{'' if n_pairs is None else f'{n_pairs} '}pairs ({which}); error = {_DISTANCES[self.distance]} on the "
             f"target from the true to the matched vertex, divided by the {_NORMALISERS[self.normaliser]}; "
-            f"mean over {self._points()} template points known on both shapes, pooled over pairs; a match on "
+            f"mean over {self._points()}{scaled}, pooled over pairs; a match on "
             f"another component counts as one diameter; left-right flip: nearer to the mirrored truth "
             f"by more than {FLIP_MARGIN:g}."
         )
-
-
-Matcher: TypeAlias = Callable[[Shape, Shape], IntArray]
-
-
-def evaluate_matches(
-    shapes: Sequence[Shape],
-    match: Matcher,
-    protocol: Protocol,
-    progress: bool = True,
-    *,
-    workers: int = 1,
-    memo: Memo | None = None,
-) -> Evaluation:
-    """Match every pair of the protocol and measure the errors.
-
-    Parameters
-    ----------
-    shapes
-        With unique names.
-    match
-        Called as ``match(source, target)``, target by target; gives for each vertex of the source a vertex of the
-        target, shape (N_source,). Only vertices with known ground truth are looked at; others may be -1.
-    protocol
-        Which pairs, distance and normaliser.
-    progress
-        Show a bar with the names of the shapes.
-    workers
-        Processes of one thread each that measure distances while this one goes on matching; up to 1 measures in this
-        process.  More need the caller's script to be importable (``if __name__ == "__main__"``), as with any process
-        pool.
-    memo
-        Such as a store: keeps distances from the protocol's points, if they are few, for the next evaluation on the
-        same shapes, whatever is matched then.
-
-    Raises
-    ------
-    DataError
-        If names repeat or are unknown, shapes have no template point in common, or a match has the wrong shape.
-    """
-    by_name = {shape.name: thinned(shape, protocol) for shape in shapes}
-    if len(by_name) != len(shapes):
-        raise DataError(f"{len(shapes)} shapes have only {len(by_name)} different names; each needs its own")
-    pairs = protocol.choose(list(by_name))
-    started = time.perf_counter()
-    jobs: dict[str, Future[TargetErrors]] = {}
-    asked: dict[str, list[MatchedPoints]] = {}
-    with progress_bar(total=len(pairs), unit="pair", disable=not progress) as bar, _pool(workers) as submit:
-        for target, sources in _by_target(pairs).items():
-            asked[target] = []
-            for source in sources:
-                bar.set_postfix_str(f"{source} -> {target}")
-                asked[target].append(matched_points(by_name[source], by_name[target], match))
-            args = by_name[target].mesh, protocol.distance, protocol.normaliser, asked[target], memo
-            jobs[target] = submit(target_errors, *args)
-            jobs[target].add_done_callback(partial(_advance, bar, len(sources)))
-        answers = {target: job.result() for target, job in jobs.items()}
-    position = {target: iter(zip(asked[target], answers[target].errors, strict=True)) for target in asked}
-    measured = [PairErrors(pair, *next(position[pair[1]]), answers[pair[1]].lengths) for pair in pairs]
-    return summarise(measured, protocol, time.perf_counter() - started)
-
-
-def thinned(shape: Shape, protocol: Protocol) -> Shape:
-    """Return the shape with only the points of the protocol known."""
-    truth = shape.truth.as_template_to_shape()
-    if protocol.points is None or protocol.points >= truth.n_from:
-        return shape
-    indices = truth.indices.copy()
-    indices[np.random.default_rng(protocol.seed).permutation(truth.n_from)[protocol.points :]] = -1
-    return replace(shape, truth=replace(truth, indices=indices))
-
-
-def _by_target(pairs: Sequence[Pair]) -> dict[str, list[str]]:
-    sources: dict[str, list[str]] = {}
-    for source, target in pairs:
-        sources.setdefault(target, []).append(source)
-    return sources
-
-
-def matched_points(source: Shape, target: Shape, match: Matcher) -> MatchedPoints:
-    """Return where the template points known on both shapes belong on the target, and where `match` takes them.
-
-    Raises
-    ------
-    DataError
-        If the shapes have no template point in common, or the match has the wrong shape.
-    """
-    points = ground_truth(source.truth, target.truth)
-    matched = np.asarray(match(source, target))
-    n, m = source.mesh.n_vertices, target.mesh.n_vertices
-    asked = matched[points.source] if matched.shape == (n,) else np.array([-1])
-    if matched.dtype.kind not in "iu" or asked.min(initial=0) < 0 or asked.max(initial=0) >= m:
-        raise DataError(
-            f"{source.name} -> {target.name}: the match is {matched.dtype} of shape {matched.shape}; wanted {n} "
-            f"integers in 0..{m - 1}"
-        )
-    mirror = None
-    if target.mirror is not None:
-        s, t = source.truth.as_template_to_shape(), target.truth.as_template_to_shape()
-        both = (s.indices >= 0) & (t.indices >= 0)
-        mirror = target.mirror.as_template_to_shape(t.n_from).indices[both]
-    return MatchedPoints(points.target, asked.astype(np.int64), mirror)
-
-
-def _advance(bar: tqdm[Any], n_pairs: int, _: Future[TargetErrors]) -> None:
-    bar.update(n_pairs)
-
-
-@contextmanager
-def _pool(workers: int) -> Iterator[Callable[..., Future[Any]]]:
-    if workers <= 1:
-        yield _at_once
-        return
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        yield lambda *task: pool.submit(_on_one_thread, *task)
-
-
-def _on_one_thread(function: Callable[..., Any], *args: Any) -> Any:
-    with threadpool_limits(1):
-        return function(*args)
-
-
-def _at_once(function: Callable[..., Any], *args: Any) -> Future[Any]:
-    done: Future[Any] = Future()
-    done.set_result(function(*args))
-    return done

@@ -18,7 +18,7 @@ from csm.evaluation.provenance import Provenance
 from csm.evaluation.results import Evaluation
 from csm.mesh.io import atomic_path, read_bytes
 
-Key: TypeAlias = tuple[str, str, str, str, str, str]
+Key: TypeAlias = tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class ResultRow:
     pairs
         Number of pairs of shapes.
     distance, normaliser
-        As in `csm.evaluation.protocol.Protocol`.
+        As in `csm.evaluation.protocol.EvaluationProtocol`.
     command, commit, versions
         As in `csm.evaluation.provenance.Provenance`.
     seconds
@@ -53,6 +53,8 @@ class ResultRow:
         As in `csm.evaluation.metrics`, mean over seeds; None if not known.
     protocol
         The protocol in words.
+    matching
+        Name of the matcher.
 
     Raises
     ------
@@ -80,10 +82,11 @@ class ResultRow:
     auc: float | None = None
     flip_rate: float | None = None
     protocol: str = ""
+    matching: str = "nearest"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "seeds", tuple(self.seeds))
-        for name in ("table", "method", "train", "test", "distance", "normaliser", "command", "commit"):
+        for name in ("table", "method", "train", "test", "distance", "normaliser", "command", "commit", "matching"):
             value = getattr(self, name)
             self._require(isinstance(value, str) and value != "", name, "a text that is not empty")
         for name in ("age", "age_std", "seconds", "p95"):
@@ -102,7 +105,7 @@ class ResultRow:
     @property
     def key(self) -> Key:
         """What makes two rows the same cell of a table; a new row replaces the old one with this key."""
-        return (self.table, self.method, self.train, self.test, self.distance, self.normaliser)
+        return (self.table, self.method, self.train, self.test, self.distance, self.normaliser, self.matching)
 
 
 def result_row(
@@ -155,6 +158,7 @@ def result_row(
         auc=mean("auc"),
         flip_rate=None if math.isnan(flip_rate) else flip_rate,
         protocol=protocol.describe(n_pairs),
+        matching=evaluations[0].matcher,
     )
 
 
@@ -264,7 +268,14 @@ def _row(entry: Any, where: str) -> ResultRow:
     missing, unknown = sorted(needed - set(entry)), sorted(set(entry) - known)
     if missing or unknown:
         raise DataError(f"{where} lacks {missing or 'nothing'} and has unknown {unknown or 'nothing'}; is it older?")
-    return ResultRow(**entry)
+    return ResultRow(**_with_matching(entry))
+
+
+def _with_matching(entry: dict[str, Any]) -> dict[str, Any]:
+    """Split the name of a method such as "faust_mgcn, argmax", as rows of the first format have it."""
+    method, _, matching = str(entry["method"]).rpartition(", ")
+    old = "matching" not in entry and matching == "argmax"
+    return {**entry, "method": method, "matching": matching} if old else entry
 
 
 def _between(value: float | None, low: float, high: float) -> bool:

@@ -1,4 +1,4 @@
-"""Markdown tables of result rows; errors are printed in thousandths of the normaliser, as the ACD paper does."""
+"""Tables of result rows; errors are printed in thousandths of the normaliser, as the ACD paper does."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 from csm.evaluation.report import ResultRow
 
-_TITLES = (
+COLUMNS = (
     "method",
+    "matching",
     "train",
     "test",
     "AGE x1000",
@@ -19,16 +20,18 @@ _TITLES = (
     "seeds",
     "epochs",
 )
+"""Titles of the columns of `table_lines`."""
 
 
-def markdown_table(rows: Sequence[ResultRow]) -> str:
-    """Return one line per row, with the protocol of each in the columns.
+def table_lines(rows: Sequence[ResultRow]) -> list[tuple[str, ...]]:
+    """Return the cells of a table with one line per row, in the order of `COLUMNS`.
 
     The error is followed by its standard deviation over seeds, if there are several.
     """
-    lines = [
+    return [
         (
             row.method,
+            row.matching,
             row.train,
             row.test,
             error_cell(row),
@@ -42,7 +45,13 @@ def markdown_table(rows: Sequence[ResultRow]) -> str:
         )
         for row in rows
     ]
-    return _markdown(_TITLES, lines)
+
+
+def markdown_table(rows: Sequence[ResultRow]) -> str:
+    """Return the table of `table_lines` in markdown."""
+    lines = [COLUMNS, ("---",) * len(COLUMNS), *table_lines(rows)]
+    cells = [[cell.replace("|", "\\|") for cell in line] for line in lines]
+    return "".join("| " + " | ".join(line) + " |\n" for line in cells)
 
 
 def error_cell(row: ResultRow) -> str:
@@ -53,11 +62,3 @@ def error_cell(row: ResultRow) -> str:
 
 def _optional(value: float | None, factor: float) -> str:
     return "-" if value is None else f"{factor * value:.1f}"
-
-
-def _markdown(titles: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
-    head = ["| " + " | ".join(titles) + " |", "|" + "---|" * len(titles)]
-    return (
-        "\n".join([*head, *("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)])
-        + "\n"
-    )

@@ -1,1 +1,1 @@
-"""Training: the LightningModule, the loss, callbacks, checkpoints and exports."""
+"""Training: the tensors of a shape, the LightningModule, the loss, checkpoints and exports."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 import lightning as L
 import torch
@@ -11,12 +11,11 @@ from torch import Tensor
 from torch.optim import Adam
 from torch.optim.lr_scheduler import CosineAnnealingLR, LRScheduler, OneCycleLR, StepLR
 
-from csm.data.datamodule import ShapeSample
 from csm.descriptors import Coordinates
 from csm.errors import ConfigError
-from csm.evaluation.matching import Votes, votes
 from csm.learning.loss import Products, linear_cross_entropy
-from csm.networks import CorrespondenceNetwork, Surface, build
+from csm.learning.samples import NetworkInput, ShapeSample
+from csm.networks import Surface, build
 
 Schedule = Literal["constant", "cosine", "step", "drop", "one_cycle"]
 
@@ -84,7 +83,7 @@ class CSMModule(L.LightningModule):
             self.network = build(options.pop("name"), in_channels, n_classes, **options)
         except ValueError as error:
             raise ConfigError(str(error)) from error
-        wanted = int(getattr(self.network, "ks", 0))
+        wanted = self.network.n_eigenpairs
         if wanted > basis_k:
             raise ConfigError(
                 f"the network wants {wanted} eigenpairs, the data hold {basis_k}: set data.basis_k={wanted} or a "
@@ -96,29 +95,25 @@ class CSMModule(L.LightningModule):
             raise ConfigError(f"loss_rows={loss_rows}; wanted a number of vertices from 1, or none for all")
         if rotate and descriptor.get("name") != Coordinates.name:
             raise ConfigError(
-                f"optimizer.rotate turns vertex positions, and the input is {descriptor.get('name')!r}: set "
+                f"learning.rotate turns vertex positions, and the input is {descriptor.get('name')!r}: set "
                 "descriptor=xyz, or leave rotate out, as the other descriptors do not turn with the shape"
             )
         self.loss_products: Products = loss_products
         self.rotate = rotate
         self.loss_rows = loss_rows
 
-    @property
-    def _net(self) -> CorrespondenceNetwork:
-        return cast(CorrespondenceNetwork, self.network)
-
     def forward(self, features: Tensor, surface: Surface) -> Tensor:
         """Return the learned descriptor, shape (N, Q)."""
-        return self._net.describe(features, surface)
+        return self.network.describe(features, surface)
 
     def loss(self, descriptor: Tensor, sample: ShapeSample) -> Tensor:
         """Cross-entropy of the classifier over the rows with a known template point (in training, a draw of them)."""
-        classifier = self._net.classifier
+        classifier = self.network.classifier
         rows, classes = sample.rows, sample.classes
         if self.training and self.loss_rows is not None and self.loss_rows < len(rows):
             drawn = torch.randperm(len(rows), device=rows.device)[: self.loss_rows]
             rows, classes = rows[drawn], classes[drawn]
-        x = self._net.dropout(descriptor[rows])
+        x = self.network.dropout(descriptor[rows])
         return linear_cross_entropy(x, classifier.weight, classifier.bias, classes, products=self.loss_products)
 
     def training_step(self, sample: ShapeSample) -> Tensor:
@@ -137,24 +132,12 @@ class CSMModule(L.LightningModule):
         return descriptor
 
     @torch.no_grad()
-    def describe(self, sample: ShapeSample) -> Tensor:
-        """Return the learned descriptor of a shape in evaluation mode, shape (N, Q), on the CPU."""
+    def describe(self, given: NetworkInput) -> Tensor:
+        """Return the learned descriptor of a shape in evaluation mode, shape (N, Q), on the device of the module."""
         self.eval()
-        descriptor: Tensor = self(sample.features.to(self.device), sample.surface.to(self.device))
-        return descriptor.cpu()
-
-    def votes(self, descriptor: Tensor) -> Votes:
-        """Return what the classifier says of a shape with this learned descriptor, shape (N, Q).
-
-        Raises
-        ------
-        ConfigError
-            If the network was loaded from an export without its classifier.
-        """
-        if not self.has_classifier:
-            raise ConfigError("matching=argmax needs the classifier, which the export leaves out: use the .ckpt file")
-        classifier = self._net.classifier
-        return votes(descriptor, classifier.weight.detach().cpu(), classifier.bias.detach().cpu())
+        features, surface = given.to(self.device)
+        descriptor: Tensor = self(features, surface)
+        return descriptor
 
     def configure_optimizers(self) -> Any:
         """Adam with the chosen schedule, stepped once per training step."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +12,11 @@ import pytest
 
 from csm.errors import DataError
 from csm.evaluation import report
-from csm.evaluation.protocol import Protocol, evaluate_matches
+from csm.evaluation.protocol import EvaluationProtocol
 from csm.evaluation.provenance import Provenance
 from csm.evaluation.report import ResultRow, add_rows, merge_rows, read_rows, result_row, write_rows
-from tests.evaluation.test_protocol import noisy, shapes
+from tests.conftest import ROOT
+from tests.evaluation.toys import Fixed, Noisy, measure, shapes
 
 MADE = Provenance("csm train", "abc123", {"torch": "2.13.0"})
 
@@ -66,6 +67,7 @@ def test_a_new_row_replaces_its_cell_and_keeps_the_order(tmp_path: Path) -> None
     better = row(age=0.009, commit="def")
     assert merge_rows([a, b], [better, c]) == [better, b, c]
     assert merge_rows([a], [row(distance="edge")])[0] == a
+    assert merge_rows([a], [row(matching="argmax")]) == [a, row(matching="argmax")]
     path = tmp_path / "r.json"
     add_rows(path, [a, b])
     assert add_rows(path, [better, c]) == read_rows(path) == [better, b, c]
@@ -80,12 +82,39 @@ def test_a_new_row_replaces_its_cell_and_keeps_the_order(tmp_path: Path) -> None
         ("auc", 7.0),
         ("pairs", 0),
         ("commit", ""),
+        ("matching", ""),
         ("age", None),
     ],
 )
 def test_values_that_cannot_be_true(field: str, value: object) -> None:
     with pytest.raises(DataError, match=field):
         row(**{field: value})
+
+
+def test_rows_of_the_first_format_have_the_matcher_in_the_name_of_the_method(tmp_path: Path) -> None:
+    entries = []
+    for name in ("CSMCNN, argmax", "CSMCNN", "ACD, K = 20"):
+        entries.append({key: value for key, value in asdict(row(method=name)).items() if key != "matching"})
+    entries.append(asdict(row(method="mine, argmax", matching="nearest")))
+    (tmp_path / "r.json").write_text(json.dumps(entries))
+    found = [(r.method, r.matching) for r in read_rows(tmp_path / "r.json")]
+    assert found == [
+        ("CSMCNN", "argmax"),
+        ("CSMCNN", "nearest"),
+        ("ACD, K = 20", "nearest"),
+        ("mine, argmax", "nearest"),
+    ]
+
+
+def test_rows_inside_the_published_tables_are_read(tmp_path: Path) -> None:
+    lines = json.loads((ROOT / "results/table4.json").read_text())["rows"]
+    inside = [entry for line in lines for entry in line["rows"]]
+    (tmp_path / "r.json").write_text(json.dumps(inside))
+    found = read_rows(tmp_path / "r.json")
+    assert len(found) == len(inside) > 20
+    assert {r.matching for r in found} == {"nearest", "argmax"}
+    assert not any("," in r.method for r in found)
+    assert len({r.key for r in found}) == len(found)
 
 
 @pytest.mark.parametrize(
@@ -101,15 +130,16 @@ def test_foreign_files_are_refused_by_name(tmp_path: Path, text: str, said: str)
 
 def test_a_row_averages_over_seeds() -> None:
     items = shapes()
-    runs = [evaluate_matches(items, m, Protocol(), progress=False) for m in (noisy, lambda s, t: np.arange(162))]
+    runs = [measure(items, rule) for rule in (Noisy(), Fixed(tuple(range(162))))]
     made = result_row(runs, MADE, table="4", method="m", train="a", test="b", seeds=[0, 1], epochs=5)
     ages = [run.summary["age"] for run in runs]
     assert made.age == pytest.approx(np.mean(ages))
     assert made.age_std == pytest.approx(np.std(ages, ddof=1))
-    assert made.protocol == Protocol().describe(6)
+    assert made.protocol == EvaluationProtocol().describe(6)
+    assert made.matching == "noisy"
     single = result_row(runs[:1], MADE, table="4", method="m", train="a", test="b", seeds=[0], epochs=5)
     assert single.age_std is None
-    other = evaluate_matches(items, noisy, Protocol(distance="edge"), progress=False)
+    other = measure(items, Noisy(), EvaluationProtocol(distance="edge"))
     with pytest.raises(DataError, match="one protocol"):
         result_row([runs[0], other], MADE, table="4", method="m", train="a", test="b", seeds=[0], epochs=5)
 
@@ -119,7 +149,7 @@ def test_csv_of_rows_and_of_curves(tmp_path: Path) -> None:
     with (tmp_path / "t.csv").open() as file:
         line = next(csv.DictReader(file))
     assert (line["method"], line["age"], line["seeds"]) == ("CSMCNN", "0.0097", "0 1 2")
-    run = evaluate_matches(shapes(2), noisy, Protocol(), progress=False)
+    run = measure(shapes(2), Noisy())
     report.write_curves_csv(tmp_path / "c.csv", {"ours": run})
     values = np.loadtxt(tmp_path / "c.csv", delimiter=",", skiprows=1)
     np.testing.assert_allclose(values, np.column_stack([run.thresholds, run.cqc]), atol=1e-6)
@@ -135,6 +165,9 @@ def test_seeds_are_averaged_with_their_spread_and_other_cells_left_alone() -> No
     assert (averaged.seeds, averaged.seconds) == ((1, 2, 3), 30.0)
     assert averaged.exact_match == pytest.approx(0.2)
     assert (other.test, other.seeds) == ("FAUST 10000", (0,))
+    by_class = [row(matching="argmax", seeds=(k,)) for k in (1, 2)]
+    assert [r.matching for r in report.average_seeds([*single, *by_class])] == ["nearest", "argmax"]
+    assert report.average_seeds([row(seeds=(1,), epochs=9), row(seeds=(2,), epochs=7)])[0].epochs == 7
 
 
 @pytest.mark.parametrize("change", [{"seeds": (1,)}, {"protocol": "another"}, {"seeds": ()}])

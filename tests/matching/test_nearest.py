@@ -8,8 +8,10 @@ import torch
 from scipy.spatial.distance import cdist
 
 from csm.errors import ConfigError
-from csm.evaluation import matching
-from csm.evaluation.matching import match_features, nearest, votes
+from csm.matching import nearest as module
+from csm.matching.base import Described
+from csm.matching.nearest import Nearest, nearest
+from tests.shapes import sphere
 
 
 def features(n: int, width: int, seed: int) -> np.ndarray:
@@ -65,7 +67,7 @@ def test_memory_is_bounded_whatever_the_size(monkeypatch: pytest.MonkeyPatch) ->
         seen.append(out.numel())
         return out
 
-    monkeypatch.setattr(matching, "_MAX_ELEMENTS", 5000)
+    monkeypatch.setattr(module, "_MAX_ELEMENTS", 5000)
     monkeypatch.setattr(torch, "addmm", watched)
     q, c = features(123, 4, 0), features(700, 4, 1)
     np.testing.assert_array_equal(nearest(q, c), cdist(q, c).argmin(1))
@@ -82,22 +84,23 @@ def test_only_the_vertices_asked_for() -> None:
     assert (nearest(q, c, at=np.array([], dtype=int)) == -1).all()
 
 
-@pytest.mark.parametrize("block", [3, 100])
-def test_votes_are_the_greatest_probabilities_by_row_and_by_column(block: int) -> None:
-    g = torch.Generator().manual_seed(0)
-    descriptor, other, weight, bias = (torch.randn(*n, generator=g) for n in ((20, 5), (13, 5), (9, 5), (9,)))
-    here, there = votes(descriptor, weight, bias, block=block), votes(other, weight, bias, block=block)
-    for rows, found in ((descriptor, here), (other, there)):
-        p = torch.softmax(rows @ weight.T + bias, 1).numpy()
-        np.testing.assert_array_equal(found.classes, p.argmax(1))
-        np.testing.assert_array_equal(found.vertices, p.argmax(0))
-    np.testing.assert_array_equal(here.to(there), [there.vertices[c] for c in here.classes])
+def test_the_matcher_maps_from_the_source_to_the_target() -> None:
+    mesh, other = sphere(1), sphere(2)
+    here, there = (torch.from_numpy(features(m.n_vertices, 3, i)) for i, m in enumerate((mesh, other)))
+    found = Nearest()(Described(mesh, here), Described(other, there))
+    np.testing.assert_array_equal(found.indices, nearest(here, there))
+    assert found.n_target == other.n_vertices
+    some = Nearest()(Described(mesh, here), Described(other, there), at=np.array([7]))
+    assert (some.indices >= 0).tolist() == [i == 7 for i in range(mesh.n_vertices)]
+    assert some.indices[7] == found.indices[7]
+    assert Nearest().parameters() == {}
 
 
-def test_match_knows_its_coverage_and_names() -> None:
-    match = match_features(np.array([[0.0], [0.1], [5.0]]), np.arange(4.0)[:, None], source_name="a", target_name="b")
-    assert match.indices.tolist() == [0, 0, 3]
-    assert (match.coverage, match.source, match.target) == (0.5, "a", "b")
+def test_features_of_two_kinds_are_compared_in_double_precision() -> None:
+    q, c = features(30, 5, 0), features(20, 5, 1)
+    found = nearest(torch.from_numpy(q.astype(np.float32)), c)
+    np.testing.assert_array_equal(found, cdist(q.astype(np.float32).astype(float), c).argmin(1))
+    assert nearest(np.array([[3], [0]]), np.array([[0], [4]])).tolist() == [1, 0], "integers are numbers as well"
 
 
 def test_what_has_no_nearest_neighbour_is_refused() -> None:

@@ -1,15 +1,17 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
+import lightning as L
 import pytest
 import torch
 
-from csm.errors import DataError
-from csm.learning.export import export_module, load_module
+from csm.errors import ConfigError, DataError
+from csm.learning.checkpoint import export_module, load_module
 from csm.learning.module import CSMModule
 from csm.networks import Basis, Surface
-from tests.learning.test_module import NETWORK
+from tests.learning.toys import NETWORK
 
 
 @pytest.fixture
@@ -55,3 +57,38 @@ def test_faults_of_an_export_are_named(module, tmp_path):
     path.write_text("[1]")
     with pytest.raises(DataError, match=r"model\.json: not a checkpoint"):
         load_module(path)
+
+
+@pytest.fixture
+def checkpoint(module, tmp_path) -> Path:
+    trainer = L.Trainer(logger=False, enable_checkpointing=False, enable_progress_bar=False, max_epochs=0)
+    trainer.strategy.connect(module)
+    trainer.save_checkpoint(tmp_path / "model.ckpt")
+    return tmp_path / "model.ckpt"
+
+
+def test_a_checkpoint_is_plain_data_and_loads_without_a_config(module, checkpoint):
+    content = torch.load(checkpoint, weights_only=True)
+    assert content["hyper_parameters"]["descriptor"]["name"] == "hks"
+    again = load_module(checkpoint)
+    torch.testing.assert_close(again.eval()(*sample()), module.eval()(*sample()), atol=0, rtol=0)
+    assert again.has_classifier
+
+
+def test_a_checkpoint_of_another_format_is_refused(checkpoint):
+    content = torch.load(checkpoint, weights_only=True)
+    content["hyper_parameters"]["format"] = 99
+    torch.save(content, checkpoint)
+    with pytest.raises(ConfigError, match="has format 99, this version of csm reads format 1"):
+        load_module(checkpoint)
+
+
+def test_what_is_no_checkpoint_is_named(tmp_path):
+    with pytest.raises(DataError, match="no such checkpoint"):
+        load_module(tmp_path / "a.ckpt")
+    (tmp_path / "a.ckpt").write_bytes(b"something")
+    with pytest.raises(DataError, match=r"a\.ckpt: not a checkpoint"):
+        load_module(tmp_path / "a.ckpt")
+    torch.save({"state_dict": {}}, tmp_path / "a.ckpt")
+    with pytest.raises(DataError, match=r"a\.ckpt: not a checkpoint"):
+        load_module(tmp_path / "a.ckpt")

@@ -1,4 +1,4 @@
-"""Geodesic distances of which whole rows are kept, so that the next method tested on the same shapes finds them."""
+"""Geodesic distances whose rows are kept in the store, so that the next method tested on the same shapes finds them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ A propagation costs the area that it covers: for nearer pairs it is cheaper than
 """
 
 
-class RememberedGeodesics:
+class StoredGeodesics:
     """Distances on one mesh that keep the rows from which far pairs were asked for.
 
     Bad matches are what an evaluation spends its time on: the distance to one is a propagation over most of the shape.
@@ -57,7 +57,7 @@ class RememberedGeodesics:
         return out
 
     def diameter(self, max_rows: int = 8) -> float:
-        """Estimate the largest distance from below; see `csm.operators.geodesic.diameter`."""
+        """Estimate the largest distance from below; see `csm.operators.geodesic.Geodesics.diameter`."""
         params = {"method": self.method, "max_rows": max_rows}
         kept = self._memo.fetch(
             "geodesic-diameter", self._mesh, params, lambda: {"diameter": np.array(self._surface.diameter(max_rows))}

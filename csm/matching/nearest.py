@@ -1,92 +1,34 @@
-"""From two descriptor matrices to a point-to-point map: the nearest neighbour in descriptor space."""
+"""Matching by the nearest neighbour in descriptor space."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
 from csm._types import IntArray
+from csm.descriptors.base import Features
 from csm.errors import ConfigError
+from csm.matching.base import Described, Matcher
+from csm.matching.maps import VertexMap
 
-Rows: TypeAlias = NDArray[Any] | torch.Tensor
+Rows: TypeAlias = NDArray[Any] | torch.Tensor | Features
 _MAX_ELEMENTS = 2**25  # of one block of distances: 128 MiB in float32
 
 
-@dataclass(frozen=True, eq=False)
-class Votes:
-    """What a classifier over the template says of one shape.
+@dataclass(frozen=True)
+class Nearest(Matcher):
+    """Each vertex goes to the vertex of the target whose features are nearest; see `nearest`."""
 
-    Parameters
-    ----------
-    classes
-        Shape (N,): for each vertex the template point of greatest probability.
-    vertices
-        Shape (C,): for each template point the vertex that gives it the greatest probability.
-    """
+    name: ClassVar[str] = "nearest"
 
-    classes: IntArray
-    vertices: IntArray
-
-    def to(self, target: Votes) -> IntArray:
-        """Return the map through the template, shape (N,): for each vertex of this shape a vertex of `target`."""
-        return target.vertices[self.classes]
-
-
-@dataclass(frozen=True, eq=False)
-class Match:
-    """A map from every vertex of one shape to a vertex of another.
-
-    Parameters
-    ----------
-    indices
-        Shape (N_source,), 0-based: entry i is the vertex of the target that vertex i of the source goes to.
-    n_target
-        Number of vertices of the target.
-    source, target
-        Names of the shapes.
-    """
-
-    indices: IntArray
-    n_target: int
-    source: str = ""
-    target: str = ""
-
-    @property
-    def coverage(self) -> float:
-        """Fraction of target vertices that something is mapped to."""
-        return len(np.unique(self.indices)) / self.n_target
-
-
-def match_features(source: Rows, target: Rows, *, source_name: str = "", target_name: str = "") -> Match:
-    """Match each of N_source rows to the nearest of N_target rows (see `nearest`)."""
-    return Match(nearest(source, target), len(target), source_name, target_name)
-
-
-def votes(descriptor: torch.Tensor, weight: torch.Tensor, bias: torch.Tensor, *, block: int = 1024) -> Votes:
-    """Let a linear classifier with softmax decide, in blocks of bounded memory.
-
-    Parameters
-    ----------
-    descriptor
-        Shape (N, Q).
-    weight, bias
-        Of the classifier, shapes (C, Q) and (C,).
-    block
-        Vertices at a time.
-    """
-    classes, best, vertices = [], torch.full((len(weight),), -torch.inf), torch.zeros(len(weight), dtype=torch.int64)
-    with torch.no_grad():
-        for begin in range(0, len(descriptor), block):
-            scores = torch.log_softmax(torch.addmm(bias, descriptor[begin : begin + block], weight.T), 1)
-            classes.append(scores.argmax(1))
-            score, row = scores.max(0)
-            vertices = torch.where(score > best, row + begin, vertices)
-            best = torch.maximum(score, best)
-    return Votes(torch.cat(classes).numpy(), vertices.numpy())
+    def __call__(self, source: Described, target: Described, at: IntArray | None = None) -> VertexMap:
+        """Return the nearest neighbours, on the device of the features."""
+        indices = nearest(source.features, target.features, at=at)
+        return VertexMap(indices, target.mesh.n_vertices, source.mesh.name, target.mesh.name)
 
 
 def nearest(queries: Rows, candidates: Rows, *, at: IntArray | None = None, block: int = 256) -> IntArray:
@@ -145,7 +87,7 @@ def nearest(queries: Rows, candidates: Rows, *, at: IntArray | None = None, bloc
 
 
 def _tensor(rows: Rows) -> torch.Tensor:
-    tensor = torch.as_tensor(rows).detach()
+    tensor = rows.detach() if isinstance(rows, torch.Tensor) else torch.as_tensor(np.asarray(rows))
     return tensor if tensor.dtype in (torch.float32, torch.float64) else tensor.float()
 
 

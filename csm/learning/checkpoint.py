@@ -1,8 +1,9 @@
-"""Trained networks as files that anybody can read: weights as safetensors, everything else as json."""
+"""Reading trained networks back, and writing them as files that anybody can read: safetensors and json."""
 
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 from safetensors import SafetensorError
@@ -45,7 +46,7 @@ def export_module(module: CSMModule, folder: Path, *, classifier: bool = False) 
     return folder / SETTINGS
 
 
-def load_module(path: Path) -> CSMModule:
+def load_module(path: str | os.PathLike[str]) -> CSMModule:
     """Load a trained network: a Lightning checkpoint of ``csm train``, or the json file of an export.
 
     Nothing in the files is executed, and no configuration is needed.
@@ -55,6 +56,7 @@ def load_module(path: Path) -> CSMModule:
     DataError
         If there is no such file, or it is no network of csm.
     """
+    path = Path(path)
     if not path.is_file():
         raise DataError(f"{path}: there is no such checkpoint; csm train writes model.ckpt into its output folder")
     try:

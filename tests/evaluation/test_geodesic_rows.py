@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from csm.data.store import Store
-from csm.evaluation.distances import KEPT_POINTS, MatchedPoints, target_errors
-from csm.evaluation.remembered import FAR, RememberedGeodesics
+from csm.evaluation.geodesic_rows import FAR, StoredGeodesics
 from csm.mesh.shape import Mesh
 from csm.operators.geodesic import geodesics
 from tests.shapes import blob
@@ -29,7 +28,7 @@ def test_distances_are_those_of_the_surface_when_made_and_when_read(mesh, method
     surface = geodesics(mesh, method)
     expected = surface.pairs(sources, targets)
     for _ in range(2):
-        kept = RememberedGeodesics(geodesics(mesh, method), mesh, Store(tmp_path))
+        kept = StoredGeodesics(geodesics(mesh, method), mesh, Store(tmp_path))
         np.testing.assert_allclose(kept.pairs(sources, targets), expected, rtol=2e-7, atol=1e-12)
         np.testing.assert_allclose(kept.rows(sources[:2]), surface.rows(sources[:2]), rtol=2e-7, atol=1e-12)
         assert kept.diameter() == surface.diameter()
@@ -41,7 +40,7 @@ def test_far_pairs_make_rows_once_and_near_ones_none(mesh, tmp_path):
     straight = np.linalg.norm(mesh.vertices[sources] - mesh.vertices[targets], axis=1)
     far = straight > FAR * np.sqrt(mesh.area)
     store = Store(tmp_path)
-    kept = RememberedGeodesics(geodesics(mesh, "edge"), mesh, store)
+    kept = StoredGeodesics(geodesics(mesh, "edge"), mesh, store)
     kept.pairs(sources[~far], targets[~far])
     assert (~far).any()
     assert store.computed == 0
@@ -55,20 +54,5 @@ def test_what_no_path_joins_stays_infinitely_far(tmp_path):
     two = Mesh(
         np.concatenate([one.vertices, one.vertices + 9]), np.concatenate([one.faces, one.faces + one.n_vertices])
     )
-    kept = RememberedGeodesics(geodesics(two), two, Store(tmp_path))
+    kept = StoredGeodesics(geodesics(two), two, Store(tmp_path))
     assert kept.pairs(np.array([0]), np.array([one.n_vertices])) == np.inf
-
-
-@pytest.mark.parametrize(("points", "remembers"), [(KEPT_POINTS, True), (KEPT_POINTS + 1, False)])
-def test_errors_are_the_same_with_a_memo_and_many_points_keep_nothing(points, remembers, tmp_path):
-    mesh = blob(3)
-    rng = np.random.default_rng(1)
-    truth = rng.permutation(mesh.n_vertices)[:points]
-    asked = [MatchedPoints(truth, rng.integers(0, mesh.n_vertices, points)) for _ in range(2)]
-    plain = target_errors(mesh, "edge", "diameter", asked)
-    store = Store(tmp_path)
-    found = target_errors(mesh, "edge", "diameter", asked, store)
-    for a, b in zip(plain.errors, found.errors, strict=True):
-        np.testing.assert_allclose(a.distance, b.distance, rtol=2e-7)
-    assert plain.lengths == found.lengths
-    assert (store.computed > 0) == remembers

@@ -1,0 +1,78 @@
+"""What an evaluation keeps in memory, as a shape takes part in many pairs: shapes and descriptions used last."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from typing import Generic, TypeVar
+
+from csm.data.shapes import Shape, ShapeSet
+from csm.data.store import Store
+from csm.matching.base import Described
+from csm.matching.methods import Method
+
+T = TypeVar("T")
+
+_LIMIT = 2**31
+_BYTES_PER_VERTEX = 300  # of a mesh with its map and what is derived from it
+
+
+class Recent(Generic[T]):
+    """Remember what a function gave last, as far as that fits into a number of bytes; the last one always stays.
+
+    Parameters
+    ----------
+    make
+        The function, of any names.
+    size
+        How many bytes something takes.
+    limit
+        How many bytes there are.
+    """
+
+    def __init__(self, make: Callable[..., T], size: Callable[[T], int], limit: int) -> None:
+        self._make, self._size, self._limit = make, size, limit
+        self._kept: OrderedDict[tuple[str, ...], T] = OrderedDict()
+        self._bytes = 0
+
+    def __call__(self, *names: str) -> T:
+        """Return what the function gives for these names."""
+        if names not in self._kept:
+            self._kept[names] = self._make(*names)
+            self._bytes += self._size(self._kept[names])
+            while self._bytes > self._limit and len(self._kept) > 1:
+                self._bytes -= self._size(self._kept.popitem(last=False)[1])
+        self._kept.move_to_end(names)
+        return self._kept[names]
+
+
+class Memory:
+    """The shapes of a set and what methods say of them.
+
+    Parameters
+    ----------
+    shapes, methods, store, device
+        As in `csm.evaluation.targets.Plan`.
+    limit
+        How many bytes of shapes, and of descriptions, are kept.
+
+    Attributes
+    ----------
+    shape
+        Called with the name of a shape: the shape, with its map from the template.
+    described
+        Called with the names of a method and a shape: what the method says of it.
+    """
+
+    def __init__(
+        self, shapes: ShapeSet, methods: Mapping[str, Method], store: Store, device: str, limit: int = _LIMIT
+    ) -> None:
+        def load(name: str) -> Shape:
+            shape = shapes.load(name)
+            return Shape(shape.mesh, shape.truth.as_template_to_shape(), shape.mirror)
+
+        def describe(method: str, name: str) -> Described:
+            return methods[method].describe(self.shape(name).mesh, store, device)
+
+        self.shape = Recent(load, lambda shape: _BYTES_PER_VERTEX * shape.mesh.n_vertices, limit)
+        self.described = Recent(describe, lambda described: described.features.nbytes, limit)

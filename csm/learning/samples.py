@@ -1,0 +1,89 @@
+"""From prepared arrays to the tensors that a network takes, and what a network needs to have prepared."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from csm._types import Arrays
+from csm.data.prepare import Prepared, Recipe
+from csm.descriptors.presets import from_parameters
+from csm.errors import ConfigError
+from csm.mesh.correspondence import PointMap
+from csm.networks import Basis, Surface, stencils_of
+from csm.operators.stencils import Stencil, stencil
+
+
+class NetworkInput(NamedTuple):
+    """One shape as a network sees it: `features`, shape (N, P), and the `surface` with K eigenpairs and stencils."""
+
+    features: Tensor
+    surface: Surface
+
+    def to(self, device: torch.device | str) -> NetworkInput:
+        """Return a copy on another device."""
+        return NetworkInput(self.features.to(device), self.surface.to(device))
+
+
+class ShapeSample(NamedTuple):
+    """One training shape.
+
+    Shapes: `features` (N, P); `surface` with K eigenpairs; `rows` (R,) vertices with a known template point and
+    `classes` (R,) that point.
+    """
+
+    name: str
+    features: Tensor
+    surface: Surface
+    rows: Tensor
+    classes: Tensor
+
+
+def network_input(prepared: Prepared) -> NetworkInput:
+    """Convert a prepared mesh to float32 tensors; a mesh that was prepared without a basis has one of size 0."""
+    spectrum = prepared.basis
+    if spectrum is None:
+        n = len(prepared.features)
+        basis = Basis(torch.zeros(0), torch.zeros(n, 0), torch.ones(n))
+    else:
+        arrays = (spectrum.evals, spectrum.evecs, spectrum.mass)
+        basis = Basis(*(torch.as_tensor(a, dtype=torch.float32) for a in arrays))
+    stencils = {name: _tensors(arrays) for name, arrays in prepared.stencils.items()}
+    return NetworkInput(torch.as_tensor(prepared.features), Surface(basis, stencils))
+
+
+def shape_sample(prepared: Prepared, truth: PointMap) -> ShapeSample:
+    """Convert a prepared mesh and its map from the template to a training sample."""
+    classes = np.flatnonzero(truth.indices >= 0)
+    rows = torch.as_tensor(truth.indices[classes])
+    return ShapeSample(prepared.mesh.name, *network_input(prepared), rows, torch.as_tensor(classes))
+
+
+def _tensors(arrays: Arrays) -> dict[str, Tensor]:
+    """Convert to float32 and int64."""
+    kinds = {"f": torch.float32, "i": torch.int64}
+    return {key: torch.as_tensor(value).to(kinds[value.dtype.kind]) for key, value in arrays.items()}
+
+
+def stencils_for(network: Mapping[str, Any]) -> tuple[Stencil, ...]:
+    """Return the stencils that a network, given as its name and options, needs of every shape.
+
+    Raises
+    ------
+    ConfigError
+        If the network, an option or a stencil is unknown.
+    """
+    try:
+        return tuple(stencil(name, **parameters) for name, parameters in stencils_of(**network).items())
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+
+
+def recipe_of(hparams: Mapping[str, Any]) -> Recipe:
+    """Return what a trained network, given by the hyper-parameters of its checkpoint, needs to have prepared."""
+    descriptor = from_parameters(**hparams["descriptor"])
+    return Recipe(descriptor, hparams["basis_k"], stencils_for(hparams["network"]))

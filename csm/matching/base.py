@@ -1,0 +1,160 @@
+"""What matchers are given and what they are: descriptions of two meshes, and a rule that makes a map of them."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple
+
+import torch
+from torch import Tensor
+
+from csm._types import IntArray
+from csm.data.prepare import Recipe, shared_operators
+from csm.data.store import Store
+from csm.descriptors.constant import Constant
+from csm.errors import ConfigError
+from csm.matching.maps import VertexMap
+from csm.mesh.shape import Mesh
+from csm.operators import Spectrum
+
+
+class Classifier(NamedTuple):
+    """A linear classifier over the C template points: `weight`, shape (C, Q), and `bias`, shape (C,)."""
+
+    weight: Tensor
+    bias: Tensor
+
+
+@dataclass(frozen=True, eq=False)
+class Votes:
+    """What a classifier over the template says of one shape.
+
+    Parameters
+    ----------
+    classes
+        Shape (N,): for each vertex the template point of greatest probability.
+    vertices
+        Shape (C,): for each template point the vertex that gives it the greatest probability.
+    """
+
+    classes: IntArray
+    vertices: IntArray
+
+
+def votes(features: Tensor, classifier: Classifier, *, block: int = 1024) -> Votes:
+    """Let a linear classifier with softmax decide, in blocks of bounded memory.
+
+    Parameters
+    ----------
+    features
+        Shape (N, Q), on the device that is to do the work.
+    classifier
+        Over C template points.
+    block
+        Vertices at a time.
+
+    Raises
+    ------
+    ConfigError
+        If a number is not finite.
+    """
+    weight, bias = (tensor.to(features.device) for tensor in classifier)
+    if not torch.isfinite(features).all():
+        raise ConfigError("argmax: a descriptor is not finite, so no class is the most probable; look at the features")
+    classes, n = [], len(weight)
+    best = torch.full((n,), -torch.inf, device=features.device)
+    vertices = torch.zeros(n, dtype=torch.int64, device=features.device)
+    with torch.no_grad():
+        for begin in range(0, len(features), block):
+            scores = torch.log_softmax(torch.addmm(bias, features[begin : begin + block], weight.T), 1)
+            classes.append(scores.argmax(1))
+            score, row = scores.max(0)
+            vertices = torch.where(score > best, row + begin, vertices)
+            best = torch.maximum(score, best)
+    return Votes(torch.cat(classes).cpu().numpy(), vertices.cpu().numpy())
+
+
+def require_device(device: str) -> str:
+    """Return the name of a device if PyTorch can use it here.
+
+    Raises
+    ------
+    ConfigError
+        If there is no such device.
+
+    Examples
+    --------
+    >>> require_device("cpu")
+    'cpu'
+    """
+    try:
+        torch.empty(0, device=device)
+    except (RuntimeError, AssertionError, NotImplementedError) as error:
+        why = str(error).splitlines()[0]
+        raise ConfigError(f"device={device}: PyTorch cannot use it here ({why}); device=cpu always works") from error
+    return device
+
+
+@dataclass(frozen=True, eq=False)
+class Described:
+    """A mesh with what a method says of it.
+
+    Parameters
+    ----------
+    mesh
+        The shape, at the scale it was given.
+    features
+        Shape (N, Q), one row per vertex; matching runs on the device that it is on.
+    classifier
+        Over the template points, if the method is a network that has one.
+    store
+        Where eigenpairs are looked up and kept; without one they are computed.
+    """
+
+    mesh: Mesh
+    features: Tensor
+    classifier: Classifier | None = None
+    store: Store | None = None
+
+    @cached_property
+    def votes(self) -> Votes:
+        """What the classifier says; ConfigError if there is none."""
+        if self.classifier is None:
+            raise ConfigError(
+                f"{self.mesh.name}: matching through the classifier needs a trained network with its classifier; a "
+                "descriptor has none, and an export leaves it out: use the .ckpt file"
+            )
+        return votes(self.features, self.classifier)
+
+    def spectrum(self, k: int) -> Spectrum:
+        """Return the first `k` Laplace-Beltrami eigenpairs of the mesh at unit area."""
+        store = self.store or Store()
+        return shared_operators(self.mesh, [Recipe(Constant(), k)], store).lbo(k)
+
+
+class Matcher(ABC):
+    """A rule that makes a map from the descriptions of two shapes; its fields are its parameters.
+
+    A matcher is a frozen dataclass.  It is added to csm by one file here and one line in `csm.matching.registry`.
+    """
+
+    name: ClassVar[str]
+
+    @abstractmethod
+    def __call__(self, source: Described, target: Described, at: IntArray | None = None) -> VertexMap:
+        """Map the vertices of the source to those of the target.
+
+        Parameters
+        ----------
+        source, target
+            The shapes, described by one method.
+        at
+            Vertices of the source that are asked for, such as those with known ground truth; others may have -1.
+            None for all.
+        """
+
+    def parameters(self) -> dict[str, Any]:
+        """Return every parameter as plain data: with `name`, all that a cache key needs."""
+        return asdict(self)  # type: ignore[call-overload,no-any-return]

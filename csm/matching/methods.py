@@ -1,0 +1,156 @@
+"""Methods: ways to describe a mesh under one interface, with everything that identifies them as plain data.
+
+A handcrafted descriptor is a `DescriptorMethod`, a trained network a `csm.matching.network.NetworkMethod`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from csm.data.prepare import Recipe, features_of
+from csm.data.store import Store
+from csm.descriptors.base import Descriptor, record
+from csm.descriptors.presets import preset
+from csm.errors import ConfigError
+from csm.matching.base import Described
+from csm.mesh.shape import Mesh
+
+
+class Method(ABC):
+    """A way to describe a mesh."""
+
+    name: str
+    """What tables and figures call the method."""
+
+    @property
+    @abstractmethod
+    def key(self) -> Mapping[str, Any]:
+        """Everything that identifies the method, as plain data: what a cache key needs."""
+
+    @property
+    @abstractmethod
+    def recipe(self) -> Recipe | None:
+        """What has to be prepared of a shape, in any process; None for nothing."""
+
+    @abstractmethod
+    def describe(self, mesh: Mesh, store: Store, device: str = "cpu") -> Described:
+        """Describe a mesh.
+
+        Parameters
+        ----------
+        mesh
+            The shape, at any scale.
+        store
+            Where what was prepared is looked up and kept.
+        device
+            Where the features are computed, if the method can, and end up: "cpu", "cuda", ...
+        """
+
+
+@dataclass(frozen=True, eq=False)
+class DescriptorMethod(Method):
+    """A handcrafted descriptor.
+
+    Parameters
+    ----------
+    descriptor
+        With its parameters.
+    name
+        What tables call it; the family by default.
+    """
+
+    descriptor: Descriptor
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", self.name or self.descriptor.name)
+
+    @property
+    def key(self) -> Mapping[str, Any]:
+        """Family and parameters."""
+        return record(self.descriptor)
+
+    @property
+    def recipe(self) -> Recipe:
+        """The descriptor alone."""
+        return Recipe(self.descriptor, basis_k=0)
+
+    def describe(self, mesh: Mesh, store: Store, device: str = "cpu") -> Described:
+        """Return the descriptor of a mesh, from the store or computed and kept."""
+        features = torch.as_tensor(features_of(mesh, self.descriptor, store)).to(device)
+        return Described(mesh, features, store=store)
+
+
+@dataclass(frozen=True, eq=False)
+class PrecomputedMethod(Method):
+    """Features that are there already.
+
+    Parameters
+    ----------
+    features
+        Name of the mesh -> its features, shape (N, Q).
+    name
+        What tables call them.
+    """
+
+    features: Mapping[str, Tensor]
+    name: str = "precomputed"
+
+    @cached_property
+    def key(self) -> Mapping[str, Any]:
+        """The hash of all features."""
+        digest = hashlib.sha256()
+        for name, tensor in sorted(self.features.items()):
+            digest.update(f"{name},{tuple(tensor.shape)},{tensor.dtype};".encode())
+            digest.update(tensor.detach().cpu().numpy().tobytes())
+        return {"precomputed": digest.hexdigest()}
+
+    @property
+    def recipe(self) -> None:
+        """Nothing has to be prepared."""
+        return
+
+    def describe(self, mesh: Mesh, store: Store, device: str = "cpu") -> Described:
+        """Look the features of a mesh up by its name; ConfigError if there are none, or not one row per vertex."""
+        found = self.features.get(mesh.name)
+        if found is None:
+            raise ConfigError(f"{self.name} has no features of {mesh.name!r}; it has {', '.join(self.features)}")
+        if len(found) != mesh.n_vertices:
+            raise ConfigError(
+                f"{self.name}: {mesh.name} has {mesh.n_vertices} vertices, its features {len(found)} rows; wanted one "
+                "row per vertex"
+            )
+        return Described(mesh, found.to(device), store=store)
+
+
+def as_method(method: Method | Descriptor | str) -> Method:
+    """Return a method as it is given, of a descriptor, or of a preset by its name.
+
+    Raises
+    ------
+    ConfigError
+        If there is no preset of that name, or the object is something else.
+
+    Examples
+    --------
+    >>> as_method("acd").name
+    'acd'
+    """
+    if isinstance(method, Method):
+        return method
+    if isinstance(method, Descriptor):
+        return DescriptorMethod(method)
+    if isinstance(method, str):
+        return DescriptorMethod(preset(method), method)
+    raise ConfigError(
+        f"a method is a descriptor, the name of a preset or a trained network (csm.load_model), got a "
+        f"{type(method).__name__}"
+    )

@@ -1,0 +1,83 @@
+"""Trained networks as methods."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+from csm.data.prepare import Recipe, prepare_mesh
+from csm.data.store import Store
+from csm.learning.checkpoint import load_module
+from csm.learning.module import CSMModule
+from csm.learning.samples import network_input, recipe_of
+from csm.matching.base import Classifier, Described
+from csm.matching.methods import Method
+from csm.mesh.shape import Mesh
+
+
+class NetworkMethod(Method):
+    """A trained network, which brings the descriptor and the basis that it was trained with.
+
+    Parameters
+    ----------
+    module
+        The network.
+    name
+        What tables call it; by default what its training was called.
+    """
+
+    def __init__(self, module: CSMModule, name: str = "") -> None:
+        self.module = module
+        self.training: Mapping[str, Any] = module.hparams.get("training") or {}
+        self.name = name or str(self.training.get("name", "network"))
+
+    def __repr__(self) -> str:
+        return f"NetworkMethod({self.name!r}, {self.module.hparams['network']['name']})"
+
+    @cached_property
+    def key(self) -> Mapping[str, Any]:
+        """Network, input, and the hash of the weights."""
+        digest = hashlib.sha256()
+        for name, tensor in sorted(self.module.state_dict().items()):
+            digest.update(name.encode() + tensor.detach().cpu().numpy().tobytes())
+        hparams = self.module.hparams
+        plain = {name: hparams[name] for name in ("network", "descriptor", "basis_k")}
+        return {**plain, "weights": digest.hexdigest()}
+
+    @cached_property
+    def recipe(self) -> Recipe:
+        """Input descriptor, basis and stencils."""
+        return recipe_of(self.module.hparams)
+
+    def describe(self, mesh: Mesh, store: Store, device: str = "cpu") -> Described:
+        """Return the learned descriptor of a mesh, computed on the device."""
+        self.module.to(device)
+        features = self.module.describe(network_input(prepare_mesh(mesh, self.recipe, store)))
+        classifier = None
+        if self.module.has_classifier:
+            linear = self.module.network.classifier
+            classifier = Classifier(linear.weight.detach(), linear.bias.detach())
+        return Described(mesh, features, classifier, store)
+
+
+def load_model(path: str | os.PathLike[str], name: str = "") -> NetworkMethod:
+    """Load a trained network as a method: a checkpoint of ``csm train``, or the json file of an export.
+
+    Nothing in the files is executed, and no configuration is needed.
+
+    Parameters
+    ----------
+    path
+        Such as ``outputs/train/DATE/model.ckpt``.
+    name
+        What tables call it; by default what its training was called.
+
+    Raises
+    ------
+    DataError
+        If there is no such file, or it is no network of csm.
+    """
+    return NetworkMethod(load_module(path), name)

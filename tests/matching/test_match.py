@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from csm.data.store import Store
+from csm.descriptors import HKS
+from csm.errors import ConfigError, MeshError
+from csm.matching import DescriptorMethod, PrecomputedMethod, match_features, match_meshes
+from csm.matching.nearest import Nearest, nearest
+from csm.mesh.io import write_mesh
+from csm.mesh.shape import Mesh
+from tests.shapes import blob, rotation
+
+CHEAP = HKS(k=20, n_times=8)
+
+
+@pytest.fixture
+def meshes() -> tuple[Mesh, Mesh]:
+    mesh = blob(2)
+    return mesh, Mesh(3 * mesh.vertices @ rotation().T, mesh.faces, "turned")
+
+
+def test_a_turned_and_scaled_copy_is_matched_without_error(meshes, tmp_path):
+    match = match_meshes(*meshes, CHEAP, store=Store(tmp_path))
+    np.testing.assert_array_equal(match.indices, np.arange(162))
+    assert match.coverage == 1.0
+    assert (match.source, match.target) == meshes
+    assert repr(match) == "Match(blob -> turned by hks, nearest)"
+    assert match.map.source == "blob"
+
+
+def test_files_presets_methods_and_matchers_are_taken(meshes, tmp_path):
+    for mesh in meshes:
+        write_mesh(tmp_path / f"{mesh.name}.off", mesh)
+    paths, store = [tmp_path / f"{mesh.name}.off" for mesh in meshes], Store(tmp_path / "store")
+    match = match_meshes(str(paths[0]), paths[1], DescriptorMethod(CHEAP, "mine"), Nearest(), store=store)
+    assert (match.method.name, match.matcher, match.target.name) == ("mine", Nearest(), "turned")
+    assert (match.indices == np.arange(162)).mean() > 0.99
+    assert match_meshes(paths[0], meshes[0], "xyz", store=store).coverage == 1.0
+
+
+def test_everything_that_the_store_lacks_is_kept_in_it(meshes, tmp_path):
+    store = Store(tmp_path)
+    match_meshes(*meshes, CHEAP, store=store)
+    assert store.computed == 2
+    match_meshes(*meshes, CHEAP, store=store)
+    assert store.computed == 2
+
+
+def test_what_cannot_be_matched_is_named(meshes, tmp_path):
+    store = Store(tmp_path)
+    with pytest.raises(ConfigError, match="nearest or argmax"):
+        match_meshes(*meshes, CHEAP, "votes", store=store)
+    with pytest.raises(ConfigError, match="needs a trained network"):
+        match_meshes(*meshes, CHEAP, "argmax", store=store)
+    with pytest.raises(MeshError, match=r"gone\.off"):
+        match_meshes(tmp_path / "gone.off", meshes[1], CHEAP, store=store)
+    with pytest.raises(ConfigError, match="not finite"):
+        match_meshes(*meshes, PrecomputedMethod({m.name: torch.full((162, 1), torch.nan) for m in meshes}), store=store)
+
+
+def test_features_are_matched_as_they_are():
+    match = match_features(np.array([[0.0], [0.1], [5.0]]), np.arange(4.0)[:, None], source_name="a", target_name="b")
+    assert match.indices.tolist() == [0, 0, 3]
+    assert (match.coverage, match.source, match.target) == (0.5, "a", "b")
+    features = CHEAP(blob(2))
+    np.testing.assert_array_equal(match_features(features, features).indices, nearest(features, features))
