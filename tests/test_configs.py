@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import inspect
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,17 +14,18 @@ from hydra.utils import get_class, instantiate
 from omegaconf import DictConfig, OmegaConf
 
 from csm.commands.app import config_folder
+from csm.commands.groups import FILLED_IN, GROUPS, make_protocol
 from csm.commands.main import COMMANDS
-from csm.commands.testing import protocol_of
-from csm.data.splits import read_split
+from csm.data.registry import DATA_SETS
 from csm.descriptors import PRESETS
 from csm.learning.module import CSMModule
-from csm.networks import build, stencils_of
+from csm.networks import MODELS, NETWORKS, build, stencils_of
 from tests.shapes import blob
 from tests.surfaces import surface_of
 
 CONF = config_folder()
-FILLED_IN_BY_COMMANDS = {"self", "descriptor", "store", "workers", "options", "train_set", "test_sets"}
+for name in COMMANDS:  # the commands register the groups that they use
+    importlib.import_module(f"csm.commands.{name}")
 
 
 def names(group: str) -> list[str]:
@@ -72,6 +73,7 @@ def module_of(cfg: DictConfig) -> CSMModule:
         basis_k=cfg.data.basis_k,
         training={},
         **cfg.optimizer,
+        **cfg.learning,
     )
 
 
@@ -86,7 +88,7 @@ def test_an_experiment_makes_its_descriptor_network_and_protocol(name):
     cfg = compose("train", [f"experiment={name}"])
     module_of(cfg)
     assert cfg.model.get("ks", 0) <= cfg.data.basis_k
-    assert protocol_of(cfg.metric).distance == "exact", "numbers to be reported use exact geodesics"
+    assert make_protocol(cfg).distance == "exact", "numbers to be reported use exact geodesics"
     assert cfg.trainer.max_epochs > 0
 
 
@@ -98,38 +100,40 @@ def test_a_matrix_names_experiments_that_compose(name):
         module_of(compose("train", [*overrides, *cfg.overrides]))
 
 
-@pytest.mark.parametrize("name", names("descriptor"))
-def test_a_descriptor_file_is_the_preset_of_that_name(name):
+@pytest.mark.parametrize("name", PRESETS)
+def test_a_descriptor_of_the_group_is_the_preset_of_that_name(name):
     made = instantiate(compose("train", [f"descriptor={name}"]).descriptor)
     assert made == PRESETS[name]
     assert made.parameters() == PRESETS[name].parameters()
 
 
-@pytest.mark.parametrize("name", names("model"))
-def test_a_model_file_makes_a_network_that_runs(name):
+@pytest.mark.parametrize("name", sorted({*MODELS, *NETWORKS}))
+def test_a_model_of_the_group_is_a_network_that_runs(name):
     options = plain(compose("train", [f"model={name}"]).model)
     network = build(**options, in_channels=5, n_classes=9).double()
     surface = surface_of(blob(3), 128, stencils_of(**options))
     assert network(torch.randn(642, 5).double(), surface).shape == (642, 9)
 
 
-@pytest.mark.parametrize("name", names("data"))
-def test_a_data_file_names_a_class_and_keys_that_it_takes(name):
-    content = read("data", name)
-    cls = get_class(content["_target_"])
-    given = set(content) - {"_target_"}
-    assert given <= accepted(cls) - FILLED_IN_BY_COMMANDS, f"{cls.__name__} does not take all of {sorted(given)}"
+@pytest.mark.parametrize("name", DATA_SETS)
+def test_a_data_set_of_the_group_has_all_arguments_of_its_class(name):
+    content = GROUPS["data"]()[name]
+    cls = get_class(str(content["_target_"]))
+    assert set(content) - {"_target_"} == accepted(cls) - {*FILLED_IN}
+    assert {"basis_k", "holdout", "split"} <= set(content)
 
 
-@pytest.mark.parametrize("path", sorted((CONF / "split").glob("*.json")), ids=lambda path: path.stem)
-def test_a_split_file_can_be_read_and_does_not_test_on_training_shapes(path: Path):
-    split = read_split(path)
-    assert split.train
-    assert split.test
-    assert not set(split.train) & set(split.test)
+@pytest.mark.parametrize("group", GROUPS)
+def test_a_group_from_a_registry_has_no_files_beside_it(group):
+    assert not (CONF / group).exists(), "two places for one default"
+
+
+@pytest.mark.parametrize("name", names("recipe"))
+def test_a_recipe_makes_a_network_on_its_input(name):
+    module_of(compose("train", [f"recipe={name}"]))
 
 
 @pytest.mark.parametrize("name", TRAININGS)
-def test_an_experiment_splits_by_a_file_that_is_shipped(name):
+def test_an_experiment_splits_by_a_name(name):
     split = compose("train", [f"experiment={name}"]).data.get("split")
-    assert split is None or CONF in Path(split).parents
+    assert split is None or "/" not in split

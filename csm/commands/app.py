@@ -14,13 +14,9 @@ from typing import Any
 import hydra
 from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
-from hydra.utils import instantiate
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import DictConfig
 
-from csm.data.datamodule import CorrespondenceDataModule
-from csm.data.store import Store
 from csm.errors import CsmError
-from csm.learning.meshes import stencils_for
 from csm.mesh.io import atomic_path
 
 Run = Callable[[DictConfig], dict[str, Any]]
@@ -33,9 +29,6 @@ def config_folder() -> Path:
     package = Path(__file__).resolve().parent.parent
     inside = package / "conf"
     return inside if inside.is_dir() else package.parent / "conf"
-
-
-OmegaConf.register_new_resolver("conf", lambda inner: str(config_folder() / inner), replace=True)
 
 
 def output_folder() -> Path:
@@ -63,10 +56,38 @@ def command(config_name: str) -> Callable[[Run], Callable[[], Any]]:
         def main(cfg: DictConfig) -> Any:
             return _guarded(run, cfg)
 
-        entry: Callable[[], Any] = main
+        def entry() -> Any:
+            sys.argv[1:] = in_order([without_null(argument) for argument in sys.argv[1:]])
+            return main()
+
         return entry
 
     return decorate
+
+
+def in_order(arguments: list[str]) -> list[str]:
+    """Return ``-m`` first, wherever it stands: Hydra's parser wants all key=value in one piece.
+
+    Examples
+    --------
+    >>> in_order(["experiment=humans", "-m", "seed=0,1"])
+    ['-m', 'experiment=humans', 'seed=0,1']
+    """
+    flags = [argument for argument in arguments if argument in ("-m", "--multirun")]
+    return flags + [argument for argument in arguments if argument not in flags]
+
+
+def without_null(argument: str) -> str:
+    """Return ``logger=none`` for ``logger=null``, which Hydra refuses for a group; other arguments stay.
+
+    Examples
+    --------
+    >>> without_null("logger=null"), without_null("resume=null")
+    ('logger=none', 'resume=null')
+    """
+    group, _, value = argument.partition("=")
+    has_none = group.isidentifier() and (config_folder() / group / "none.yaml").is_file()
+    return f"{group}=none" if has_none and value in ("null", "") and "=" in argument else argument
 
 
 def _guarded(run: Run, cfg: DictConfig) -> Any:
@@ -93,15 +114,3 @@ def _guarded(run: Run, cfg: DictConfig) -> Any:
 def _own_error(error: Exception) -> Exception:
     """Return the error that Hydra wrapped while it made an object, if it is one of csm's."""
     return error.__cause__ if isinstance(error.__cause__, CsmError) else error
-
-
-def make_datamodule(cfg: DictConfig) -> CorrespondenceDataModule:
-    """Make the data module of the data group, with the descriptor of its group, the model's stencils and the store."""
-    network: dict[str, Any] = OmegaConf.to_container(cfg.model, resolve=True)  # type: ignore[assignment]
-    datamodule: CorrespondenceDataModule = instantiate(cfg.data, _partial_=True)(
-        descriptor=instantiate(cfg.descriptor),
-        stencils=stencils_for(network),
-        store=Store(cfg.store),
-        workers=cfg.workers,
-    )
-    return datamodule

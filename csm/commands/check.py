@@ -11,9 +11,9 @@ from typing import Any
 from omegaconf import DictConfig
 
 from csm.commands.app import command
-from csm.data.folder import recognise
-from csm.data.folderset import FolderSet, Missing
+from csm.data.folders import FolderSet, Missing
 from csm.data.inspection import Inspected, inspect
+from csm.data.registry import recognise
 from csm.errors import ConfigError, DataError
 
 
@@ -82,7 +82,7 @@ def _summary(report: Report) -> list[str]:
     shapes, rows = report.shapes, report.rows
     noted = sum(bool(row.findings) for row in rows if row.usable)
     lines = [
-        f"{shapes.root}: {shapes.kind.title}, called {shapes.name}",
+        f"{shapes.root}: {shapes.layout.title}, called {shapes.name}",
         f"{len(rows)} shapes, {len(shapes.mapped)} with correspondence; {report.n_unusable} cannot be used, "
         f"{noted} usable with notes",
     ]

@@ -11,10 +11,13 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig
 
 from csm.commands.app import command
+from csm.commands.groups import register
 from csm.descriptors.base import Descriptor
 from csm.errors import ConfigError
 from csm.mesh.check import require_usable
 from csm.mesh.io import atomic_path, read_mesh
+
+register("descriptor")
 
 
 def run(cfg: DictConfig) -> dict[str, Any]:

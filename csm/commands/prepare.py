@@ -7,11 +7,14 @@ from typing import Any
 
 from omegaconf import DictConfig
 
-from csm.commands.app import command, make_datamodule
-from csm.data.datamodule import CorrespondenceDataModule
+from csm.commands.app import command
+from csm.commands.groups import make_data, register
+from csm.data.base import DataModule
 from csm.data.prepare import Job, Summary, prepare
 from csm.data.store import Store
 from csm.errors import ConfigError, DataError
+
+register("data", "descriptor", "model")
 
 
 def run(cfg: DictConfig) -> dict[str, Any]:
@@ -22,8 +25,8 @@ def run(cfg: DictConfig) -> dict[str, Any]:
         return prune_store(Store(cfg.store), cfg.unused_days)
     if cfg.action != "fill":
         raise ConfigError(f"action={cfg.action}: wanted fill, check or prune")
-    datamodule = make_datamodule(cfg)
-    summary = fill_store(datamodule, all_jobs(datamodule), cfg.workers)
+    data = make_data(cfg)
+    summary = fill_store(data, all_jobs(data), cfg.workers)
     if summary.failures:
         raise DataError(
             f"{len(summary.failures)} shapes cannot be prepared; the others are in the store.\n{summary.table()}"
@@ -31,18 +34,18 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     return {"present": summary.present, "made": summary.made, "seconds": summary.seconds}
 
 
-def all_jobs(datamodule: CorrespondenceDataModule) -> list[Job]:
+def all_jobs(data: DataModule) -> list[Job]:
     """Return every training and test shape of a data module, each once."""
-    train = [Job(datamodule.train_set, name) for name in datamodule.train_names()]
-    test = [Job(shapes, name) for shapes in datamodule.test_sets.values() for name in datamodule.test_names(shapes)]
+    train = [Job(data.train_set, name) for name in data.train_names()]
+    test = [Job(shapes, name) for shapes in data.test_sets.values() for name in data.test_names(shapes)]
     return list({job.label: job for job in [*train, *test]}.values())
 
 
-def fill_store(datamodule: CorrespondenceDataModule, jobs: list[Job], workers: int | None) -> Summary:
+def fill_store(data: DataModule, jobs: list[Job], workers: int | None) -> Summary:
     """Prepare the shapes and print an account."""
-    root = datamodule.store.root
+    root = data.store.root
     print(f"preparing {len(jobs)} shapes into {root} ({_gigabytes(_existing(root))} GB free there)")
-    summary = prepare(jobs, datamodule.recipe, datamodule.store, workers=workers)
+    summary = prepare(jobs, [data.recipe], data.store, workers=workers)
     print(
         f"{summary.made} made, {summary.present} already there, {len(summary.failures)} failed, "
         f"in {summary.seconds / 60:.1f} minutes"

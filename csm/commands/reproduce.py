@@ -2,38 +2,35 @@
 
 from __future__ import annotations
 
-import inspect
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from hydra import compose
+from hydra.core.config_store import ConfigStore
 from omegaconf import DictConfig, OmegaConf
 
-from csm._processes import processes
+from csm._parallel import n_processes
+from csm.commands import matrix
 from csm.commands.app import command
-from csm.commands.learned import LEARNED
-from csm.commands.learned import make as make_learned
+from csm.commands.groups import plain
 from csm.data.store import Store
 from csm.errors import ConfigError
 from csm.evaluation.provenance import provenance
 from csm.mesh.io import copy_file
-from csm.studies.registry import listing, study
-from csm.studies.study import Context, Findings, write_findings
+from csm.reproduction.registry import STUDIES, entry, listing, make_study, options_of
+from csm.reproduction.study import Context, FilledMatrix, Findings, write_findings
 
-
-def _listing() -> str:
-    return "\n".join([listing(), *(f"  {name:<12}{entry.purpose}" for name, entry in LEARNED.items())])
-
-
-OmegaConf.register_new_resolver("studies", _listing, replace=True)
+OmegaConf.register_new_resolver("studies", listing, replace=True)
+ConfigStore.instance().store(name="studies", node={name: options_of(name) for name in STUDIES}, provider="csm")
 
 
 def run(cfg: DictConfig) -> dict[str, Any]:
     """Make every study of ``targets``, one after the other."""
     if not cfg.targets:
-        raise ConfigError(f"reproduce needs names of studies, such as csm reproduce table1; there are\n{_listing()}")
+        raise ConfigError(f"reproduce needs names of studies, such as csm reproduce table1; there are\n{listing()}")
     return make_studies(cfg, [str(name) for name in cfg.targets])
 
 
@@ -45,43 +42,37 @@ def make_studies(cfg: DictConfig, names: Sequence[str]) -> dict[str, Any]:
     ConfigError
         If a study or one of its options is unknown, before any is begun.
     """
+    for name in names:
+        entry(name)  # before the options are read, so that the message names the studies
+    studies = [make_study(name, plain(cfg[name])) for name in names]
     context = Context(
-        Path(cfg.data.root), Path(cfg.out), Store(cfg.store), processes(cfg.workers, n_jobs=3), int(cfg.seed)
+        root=Path(cfg.data.root),
+        out=Path(cfg.out),
+        store=Store(cfg.store),
+        workers=n_processes(cfg.workers, n_tasks=3),
+        seed=int(cfg.seed),
+        device=cfg.device,
+        fill_matrix=partial(fill_matrix, cfg),
     )
-    wanted = {name: _maker(cfg, context, name) for name in names}
     context.out.mkdir(parents=True, exist_ok=True)
     taken: dict[str, Any] = {}
-    for name, make in wanted.items():
+    for study in studies:
         begun = time.perf_counter()
-        findings = make()
+        findings = study.run(context)
         seconds = time.perf_counter() - begun
         conclude(findings, context.out, cfg.results, seconds)
-        taken[f"seconds/{name}"] = round(seconds, 1)
+        taken[f"seconds/{study.name}"] = round(seconds, 1)
     return taken
 
 
-def _maker(cfg: DictConfig, context: Context, name: str) -> Callable[[], Findings]:
-    if name in LEARNED:
-        return partial(make_learned, cfg, context, name)
-    return partial(study(name).load(), context, **options_of(cfg, name))
-
-
-def options_of(cfg: DictConfig, name: str) -> dict[str, Any]:
-    """Return the options of a study, which are the keys of the section that has its name.
-
-    Raises
-    ------
-    ConfigError
-        If the study has no such option.
-    """
-    section = OmegaConf.to_container(cfg.get(name) or OmegaConf.create(), resolve=True)
-    assert isinstance(section, dict)
-    options: Mapping[str, Any] = {str(key): value for key, value in section.items()}
-    known = [p.name for p in inspect.signature(study(name).load()).parameters.values() if p.kind is p.KEYWORD_ONLY]
-    unknown = [key for key in options if key not in known]
-    if unknown:
-        raise ConfigError(f"{name} has no option {', '.join(unknown)}; it has {', '.join(known) or 'none'}")
-    return dict(options)
+def fill_matrix(cfg: DictConfig, experiment: str, folder: Path, overrides: Sequence[str]) -> FilledMatrix:
+    """Fill the matrix of an experiment in a folder, with the store, workers and device of ``csm reproduce``."""
+    fixed = [f"experiment={experiment}", f"folder={folder}", "results=null", f"device={cfg.device}"]
+    fixed += [f"store={Store(cfg.store).root}"]
+    wanted = compose("matrix", overrides=[*fixed, *overrides])
+    rows = matrix.rows_of(wanted)
+    settings = {row.name: row.identity for row in rows}
+    return FilledMatrix(matrix.fill(wanted, rows), settings)
 
 
 def conclude(findings: Findings, out: Path, results: str | None, seconds: float) -> None:

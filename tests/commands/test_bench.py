@@ -7,7 +7,7 @@ from hydra.core.global_hydra import GlobalHydra
 
 from csm.commands import bench
 from csm.commands.main import main
-from csm.studies.registry import STUDIES
+from csm.reproduction.registry import STUDIES
 
 
 @pytest.fixture

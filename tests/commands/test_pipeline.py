@@ -13,9 +13,7 @@ import numpy as np
 import pytest
 from omegaconf import OmegaConf
 
-from csm.commands.train import make_trainer
 from csm.evaluation.report import read_rows
-from csm.learning.callbacks import EpochLines
 from csm.mesh.io import read_mesh
 from tests.toyset import write_toys
 
@@ -34,7 +32,6 @@ SMALL = [
     "trainer.max_epochs=60",
     "trainer.accelerator=cpu",
     "trainer.check_val_every_n_epoch=30",
-    "+trainer.enable_progress_bar=false",
     "workers=0",
 ]
 
@@ -103,7 +100,8 @@ def test_the_classifier_matches_as_well_where_it_is_there(bench, trained, capsys
     options = ["data=folder", "data.root=toys", "data.n_test=2", "hydra.run.dir=votes", POINTS]
     bench.run("evaluate", "checkpoint=run/model.ckpt", "matching=[nearest,argmax]", *options)
     by_descriptor, by_class = read_rows(bench.folder / "votes/rows.json")
-    assert (by_descriptor.method, by_class.method) == ("toy", "toy, argmax")
+    assert {by_descriptor.method, by_class.method} == {"toy"}
+    assert (by_descriptor.matching, by_class.matching) == ("nearest", "argmax")
     assert 0 < by_class.age < 0.1
     assert by_class.age != by_descriptor.age
     assert (bench.folder / "votes/map_toys_argmax.png").exists()
@@ -114,15 +112,20 @@ def test_the_classifier_matches_as_well_where_it_is_there(bench, trained, capsys
 
 
 @pytest.mark.parametrize(
-    ("terminal", "wanted", "bar", "lines"), [(1, 1, 1, 0), (0, 1, 0, 1), (1, 0, 0, 0), (0, 0, 0, 0)]
+    ("words", "left"),
+    [
+        ("logger=csv", "csv"),
+        *((words, None) for words in ("logger=none", "logger=null", "~logger", "trainer=cpu logger=none")),
+        *((words, None) for words in ("callbacks=none logger=none", "~callbacks logger=none")),
+    ],
 )
-def test_a_bar_is_for_terminals_and_lines_are_for_logs(tmp_path, monkeypatch, terminal, wanted, bar, lines):
-    monkeypatch.setattr(sys.stdout, "isatty", lambda: bool(terminal))
-    options = {"_target_": "lightning.Trainer", "accelerator": "cpu", "enable_progress_bar": bool(wanted)}
-    groups = {name: {} for name in ("data", "descriptor", "model", "optimizer")}
-    trainer = make_trainer(OmegaConf.create({"seed": 0, "logger": None, "trainer": options, **groups}), tmp_path)
-    assert (trainer.progress_bar_callback is not None) == bool(bar)
-    assert any(isinstance(callback, EpochLines) for callback in trainer.callbacks) == bool(lines)
+def test_loggers_callbacks_and_trainers_are_chosen_by_a_word(bench, words, left):
+    folder = "logged_" + words.translate(str.maketrans({"=": "_", " ": "_", "~": "_"}))
+    short = ["data.root=toys", "trainer.max_epochs=1", "test=false", f"hydra.run.dir={folder}"]
+    bench.run("train", *SMALL, *short, *words.split())
+    assert (bench.folder / folder / "checkpoints/last.ckpt").is_file()
+    logs = {path.name for path in (bench.folder / folder).iterdir()} & {"tensorboard", "csv", "lightning_logs"}
+    assert logs == ({left} if left else set())
 
 
 @pytest.mark.slow
@@ -171,7 +174,7 @@ def test_a_matrix_is_resumed_cell_by_cell(bench, capsys):
     assert left.seeds == (0,)
     with pytest.raises(SystemExit):
         bench.run("matrix", *arguments, "folder=empty", "train=false")
-    assert "no trained network" in capsys.readouterr().err
+    assert "no network of these rows" in capsys.readouterr().err
 
 
 def test_a_matrix_fills_only_the_rows_asked_for_and_ends_a_training_in_time(bench, capsys):
@@ -192,7 +195,7 @@ def test_a_row_that_was_trained_otherwise_is_not_taken_for_another(bench, capsys
         bench.run("matrix", "folder=shared", f"+rows.one=[{options}]")
 
     fill()
-    fill("data.test_roots=[toys]", "trainer.enable_progress_bar=false")  # changes nothing of the training
+    fill("data.test_roots=[toys]", "+trainer.enable_progress_bar=false")  # changes nothing of the training
     before = (bench.folder / "shared/one/seed0/model.ckpt").read_bytes()
     with pytest.raises(SystemExit):
         fill("model.dropout=0.25")
@@ -200,7 +203,7 @@ def test_a_row_that_was_trained_otherwise_is_not_taken_for_another(bench, capsys
     assert (bench.folder / "shared/one/seed0/model.ckpt").read_bytes() == before
     file = bench.folder / "shared/one/seed0/row.json"
     kept = json.loads(file.read_text())
-    file.write_text(json.dumps({key: value for key, value in kept.items() if key != "optimizer.rotate"}))
+    file.write_text(json.dumps({key: value for key, value in kept.items() if key != "learning.rotate"}))
     fill()  # an option of a later version that is off
     file.write_text(json.dumps({key: value for key, value in kept.items() if key != "optimizer.lr"}))
     with pytest.raises(SystemExit):
@@ -222,7 +225,7 @@ def test_a_table_of_learned_methods_is_reproduced_from_its_matrix(bench):
     (line,) = record["rows"]
     assert (line["method"], line["seeds"]) == ("toy", "0 1")
     assert "toys paper" not in line
-    assert {row["method"] for row in line["rows"]} == {"toy", "toy, argmax"}
+    assert {(row["method"], row["matching"]) for row in line["rows"]} == {("toy", "nearest"), ("toy", "argmax")}
     assert (bench.folder / "shown/table4.png").exists()
 
 

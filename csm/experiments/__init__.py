@@ -1,0 +1,1 @@
+"""Training, testing and matrices of both, usable in a script without Hydra."""

@@ -1,0 +1,205 @@
+"""A matrix of trainings and tests: every row is trained once per seed and tested on every test set, resumable.
+
+The folder holds, per row and seed, ``model.ckpt``, how it was trained (``row.json``) and one json per test set and
+matcher.  Cells that exist are not computed again, so a matrix that was ended is started again with the same command; a
+training goes on from its last epoch, a test from its last target.  Matrices with a folder in common share the rows that
+have the same name.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from csm.data.store import Store
+from csm.errors import ConfigError, CsmError
+from csm.evaluation.protocol import EvaluationProtocol
+from csm.evaluation.report import ResultRow, average_seeds, read_rows, write_curves_csv, write_rows
+from csm.experiments.testing import measure_set
+from csm.experiments.training import Training, fit, last_checkpoint
+from csm.matching.network import NetworkMethod, load_model
+from csm.mesh.io import atomic_path
+
+_log = logging.getLogger(__name__)
+
+_MOVED = {f"optimizer.{name}": f"learning.{name}" for name in ("loss_products", "loss_rows", "rotate")}
+"""Options that stand in another group in the ``row.json`` of earlier versions."""
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One row and seed of a matrix.
+
+    Parameters
+    ----------
+    name, seed
+        What results call the method, and the seed of its training.
+    make
+        Makes the training; it is forgotten when the row is filled, as its shapes are many.
+    identity
+        What the training depends on, flat plain data: a folder that was trained otherwise is refused.
+    """
+
+    name: str
+    seed: int
+    make: Callable[[], Training]
+    identity: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Matrix:
+    """What the rows of a matrix have in common.
+
+    Parameters
+    ----------
+    folder
+        Where checkpoints and cells are kept.
+    protocol
+        Of the tests.
+    matching
+        Names of the matchers.
+    table
+        Name of the table that the result rows belong to.
+    train
+        Whether rows without a trained network are trained; otherwise they are left out.
+    device
+        Where networks run in tests.
+    """
+
+    folder: Path
+    protocol: EvaluationProtocol
+    matching: Sequence[str] = ("nearest",)
+    table: str = "matrix"
+    train: bool = True
+    device: str = "cpu"
+
+    def fill(self, rows: Iterable[Row]) -> list[ResultRow]:
+        """Fill the cells that are missing and return the table, averaged over seeds; it is also written as json.
+
+        Raises
+        ------
+        ConfigError
+            After all other rows are done, if some failed; or if nothing is trained and nothing may be.
+        """
+        found: list[ResultRow] = []
+        failures: list[str] = []
+        for row in rows:
+            if not self.train and not self._checkpoint(row).exists():
+                _log.warning("%s, seed %s: not trained yet, left out (train=false)", row.name, row.seed)
+                continue
+            try:
+                found += self._fill_row(row)
+            except CsmError as error:
+                failures.append(f"{row.name}, seed {row.seed}: {error}")
+                _log.error("%s", failures[-1])
+        table = average_seeds(found)
+        if table:
+            write_rows(self.folder / f"{self.table}.json", table)
+        if failures:
+            many = f"{len(failures)} rows of the matrix failed, the others are done:\n"
+            raise ConfigError(many + "\n".join(failures))
+        if not table:
+            raise ConfigError(
+                f"{self.folder}: no network of these rows and seeds is trained, and train=false trains none"
+            )
+        return table
+
+    def _place(self, row: Row) -> Path:
+        return self.folder / row.name / f"seed{row.seed}"
+
+    def _checkpoint(self, row: Row) -> Path:
+        return self._place(row) / "model.ckpt"
+
+    def _fill_row(self, row: Row) -> list[ResultRow]:
+        """Return the rows of every test set, one matcher after the other."""
+        require_same_training(self._place(row), row.identity)
+        training = row.make()
+        tests = training.data.test_sets
+        found = {(test, rule): cell for test in tests for rule, cell in self._cells(row, training, test).items()}
+        return [found[test, rule] for rule in self.matching for test in tests]
+
+    def _cells(self, row: Row, training: Training, test: str) -> dict[str, ResultRow]:
+        """Return the rows of one test set, from files that answer the same question or measured together."""
+        cells = {rule: self._kept(self._file(row, test, rule)) for rule in self.matching}
+        missing = [rule for rule, cell in cells.items() if cell is None]
+        if missing:
+            tested = measure_set(
+                self._method(row, training),
+                training.data,
+                training.data.test_sets[test],
+                self.protocol,
+                matching=missing,
+                table=self.table,
+                results=Store(self._place(row) / "targets"),
+                device=self.device,
+            )
+            for one in tested:
+                path = self._file(row, test, one.row.matching)
+                write_rows(path, [one.row])
+                write_curves_csv(path.with_suffix(".cqc.csv"), {test: one.evaluation})
+                cells[one.row.matching] = one.row
+        return {rule: cell for rule, cell in cells.items() if cell is not None}
+
+    def _method(self, row: Row, training: Training) -> NetworkMethod:
+        """Return the trained network of a row: the one in the folder, or trained now."""
+        place, checkpoint = self._place(row), self._checkpoint(row)
+        if checkpoint.exists():
+            return load_model(checkpoint, row.name)
+        last = last_checkpoint(place)
+        return NetworkMethod(fit(training, place, last if last.exists() else None).module, row.name)
+
+    def _file(self, row: Row, test: str, rule: str) -> Path:
+        kind = "" if rule == "nearest" else f"_{rule}"
+        return self._place(row) / f"{test}_{self.protocol.distance}_{self.protocol.normaliser}{kind}.json"
+
+    def _kept(self, path: Path) -> ResultRow | None:
+        if not path.exists():
+            return None
+        (row,) = read_rows(path)
+        if row.protocol == self.protocol.describe(row.pairs):
+            return replace(row, table=self.table)  # a matrix that shares the folder may have measured it
+        _log.warning("%s answers another protocol (%s); it is computed again", path, row.protocol)
+        return None
+
+
+def require_same_training(folder: Path, identity: Mapping[str, Any]) -> None:
+    """Keep in a folder how a row is trained, or refuse the folder if it was trained otherwise.
+
+    An option that is off and that the folder does not know of came with a later version and changes nothing.
+
+    Raises
+    ------
+    ConfigError
+        With the entries that differ.
+    """
+    path, wanted = folder / "row.json", _comparable(identity)
+    if not path.exists():
+        with atomic_path(path) as temporary:
+            temporary.write_text(json.dumps(wanted, indent=1) + "\n", encoding="utf-8")
+        return
+    kept = _comparable(json.loads(path.read_text(encoding="utf-8")))
+    changed = [
+        f"{key}: {kept.get(key)} there, {wanted.get(key)} wanted"
+        for key in sorted({*kept, *wanted})
+        if kept.get(key) != wanted.get(key) and (key in kept or wanted[key])
+    ]
+    if changed:
+        raise ConfigError(
+            f"{folder} was trained otherwise ({'; '.join(changed)}); give the row another name, choose another "
+            "folder=, or remove that one"
+        )
+
+
+def _comparable(identity: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings as json has them, with today's names; where classes and split files lie plays no part."""
+    found: dict[str, Any] = {_MOVED.get(k, k): value for k, value in json.loads(json.dumps(dict(identity))).items()}
+    for key in ("data._target_", "descriptor._target_"):
+        if key in found:
+            found[key] = found[key].rpartition(".")[2]
+    if found.get("data.split"):
+        found["data.split"] = Path(found["data.split"]).stem
+    return found

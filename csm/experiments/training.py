@@ -1,0 +1,170 @@
+"""One training from its settings to a checkpoint, without Hydra."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import time
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import lightning as L
+from lightning.pytorch.callbacks import ModelCheckpoint
+from lightning.pytorch.loggers import Logger
+
+from csm.data.base import DataModule
+from csm.descriptors.base import record
+from csm.errors import ConfigError
+from csm.evaluation.provenance import provenance
+from csm.experiments.callbacks import EpochLines, ValidationErrors
+from csm.experiments.tensorboard import TensorBoardPanels
+from csm.learning.checkpoint import export_module
+from csm.learning.loading import LightningData
+from csm.learning.module import CSMModule
+
+
+@dataclass(frozen=True, eq=False)
+class Training:
+    """Everything that a training depends on.
+
+    Parameters
+    ----------
+    name
+        What result rows call the trained method.
+    data
+        The data module.
+    network
+        Name and options of the network, for `csm.networks.build`.
+    options
+        Of `csm.learning.module.CSMModule`: learning rate, schedule, loss.
+    trainer
+        Makes Lightning's trainer, such as ``functools.partial(lightning.Trainer, max_epochs=20)``.
+    seed
+        Of all random choices.
+    callbacks
+        For the trainer, besides the one that keeps the last checkpoint.
+    logger
+        Called with ``save_dir=``; None for no log.
+    settings
+        All settings as plain data, for TensorBoard's table of hyper-parameters.
+    """
+
+    name: str
+    data: DataModule
+    network: Mapping[str, Any]
+    options: Mapping[str, Any] = field(default_factory=dict)
+    trainer: Callable[..., L.Trainer] = L.Trainer
+    seed: int = 0
+    callbacks: Sequence[L.Callback] = field(default_factory=lambda: default_callbacks())
+    logger: Callable[..., Logger] | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Trained:
+    """A trained network, its checkpoint, and what was measured on the way."""
+
+    module: CSMModule
+    checkpoint: Path
+    seconds: float
+    measured: Mapping[str, float]
+
+
+def default_callbacks(seed: int = 0) -> list[L.Callback]:
+    """Return the callbacks of ``csm train``: validation errors, TensorBoard's panels, a line per epoch."""
+    return [ValidationErrors(seed=seed), TensorBoardPanels(), EpochLines()]
+
+
+def last_checkpoint(folder: Path) -> Path:
+    """Return where the last epoch of a training in this folder is kept, so that it can go on from there."""
+    return folder / "checkpoints" / "last.ckpt"
+
+
+def fit(training: Training, folder: Path, resume: Path | str | None = None) -> Trained:
+    """Train, and save ``model.ckpt`` and ``export/`` in a folder.
+
+    Parameters
+    ----------
+    training
+        What is trained on what.
+    folder
+        Where checkpoints and logs go.
+    resume
+        A checkpoint to go on from.
+
+    Raises
+    ------
+    DataError
+        If training shapes cannot be used.
+    ConfigError
+        If the settings do not fit each other.
+    """
+    _quiet_lightning()
+    L.seed_everything(training.seed, workers=True, verbose=False)
+    trainer = _make_trainer(training, folder)
+    loaded = LightningData(training.data)
+    loaded.prepare_data()
+    module = make_module(training, loaded.n_features, trainer.max_epochs)
+    begun = time.perf_counter()
+    trainer.fit(module, datamodule=loaded, ckpt_path=resume, weights_only=True)
+    seconds = time.perf_counter() - begun
+    module.hparams["training"]["epochs"] = trainer.current_epoch  # fewer than asked for where max_time ended it
+    checkpoint = folder / "model.ckpt"
+    trainer.save_checkpoint(checkpoint)
+    export_module(module, folder / "export")
+    measured = {key: float(value) for key, value in trainer.callback_metrics.items()}
+    return Trained(module, checkpoint, seconds, measured)
+
+
+def make_module(training: Training, n_features: int, epochs: int | None = None) -> CSMModule:
+    """Make the untrained module of a training for input features of this width."""
+    data, made = training.data, provenance()
+    return CSMModule(
+        network=dict(training.network),
+        in_channels=n_features,
+        n_classes=data.n_classes,
+        descriptor=record(data.recipe.descriptor),
+        basis_k=data.recipe.basis_k,
+        **training.options,
+        training={
+            "name": training.name,
+            "set": data.train_set.name,
+            "protocol": data.protocol,
+            "seed": training.seed,
+            "epochs": epochs,
+            "command": made.command,
+            "commit": made.commit,
+        },
+    )
+
+
+def _make_trainer(training: Training, folder: Path) -> L.Trainer:
+    """Make the trainer; Lightning's bar needs a terminal, elsewhere `EpochLines` takes its place."""
+    last = last_checkpoint(folder)
+    keep = ModelCheckpoint(last.parent, filename=last.stem, enable_version_counter=False, save_on_train_epoch_end=True)
+    for callback in training.callbacks:
+        if isinstance(callback, TensorBoardPanels) and not callback.hparams:
+            callback.hparams = training.settings
+    trainer = training.trainer(
+        callbacks=[*training.callbacks, keep],
+        logger=training.logger(save_dir=folder) if training.logger else False,
+        default_root_dir=folder,
+        **({} if sys.stdout.isatty() else {"enable_progress_bar": False}),
+    )
+    if trainer.num_devices != 1 or trainer.num_nodes != 1:
+        raise ConfigError(
+            f"trainer.devices={trainer.num_devices}: csm trains on one device, as a batch is one shape; set "
+            "trainer.devices=1"
+        )
+    return trainer
+
+
+def _quiet_lightning() -> None:
+    """Keep Lightning's hints and advertisements out of the output; its warnings stay."""
+    logging.getLogger("lightning.pytorch").setLevel(logging.WARNING)
+    logging.getLogger("lightning.fabric").setLevel(logging.WARNING)
+    warnings.filterwarnings("ignore", message=r".*LeafSpec.*is deprecated")
+    warnings.filterwarnings("ignore", message=r".*does not have many workers.*")

@@ -1,0 +1,74 @@
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+import torch
+
+from csm.evaluation import evaluate
+from csm.experiments.callbacks import EpochLines, ValidationErrors
+from csm.learning.loading import LightningData
+from csm.matching.network import NetworkMethod
+from tests.learning.toys import make, train
+from tests.toyset import toy_datamodule
+
+
+@pytest.fixture(scope="module")
+def loaded(tmp_path_factory) -> LightningData:
+    made = LightningData(toy_datamodule(tmp_path_factory.mktemp("callbacks")))
+    made.prepare_data()
+    return made
+
+
+def test_the_validation_errors_are_those_of_the_network_by_the_protocol(loaded, tmp_path):
+    errors, module = ValidationErrors(pairs=4, points=50, seed=2), make(loaded)
+    trainer = train(module, loaded, tmp_path, 2, callbacks=[errors])
+    assert errors.protocol.describe().startswith("4 pairs (drawn with seed 2")
+    shapes = loaded.data.validation_shapes()
+    (alone,) = evaluate(NetworkMethod(module), shapes, errors.protocol, store=loaded.data.store, workers=0)
+    np.testing.assert_allclose(errors.latest.errors, alone.errors, atol=1e-6)
+    assert trainer.callback_metrics["val/age"] == pytest.approx(alone.summary["age"], abs=1e-6)
+    assert trainer.callback_metrics["val/exact"] == pytest.approx(alone.summary["exact"])
+
+
+def test_a_single_validation_shape_has_no_pair_and_ends_no_training(tmp_path):
+    made = LightningData(toy_datamodule(tmp_path, holdout=1))
+    made.prepare_data()
+    errors = ValidationErrors()
+    trainer = train(make(made), made, tmp_path, 1, callbacks=[errors])
+    assert "val/age" not in trainer.callback_metrics
+    assert "val/loss" in trainer.callback_metrics
+    assert errors.latest is None
+
+
+def test_the_check_before_a_training_is_not_measured(loaded, tmp_path):
+    errors = ValidationErrors(pairs=1, points=5)
+    train(make(loaded), loaded, tmp_path, 1, callbacks=[errors], num_sanity_val_steps=2, limit_train_batches=0)
+    assert errors.latest is None
+
+
+def test_a_line_per_epoch_shows_the_numbers_of_the_bar(loaded, tmp_path, capsys):
+    callbacks = [ValidationErrors(pairs=2, points=20), EpochLines()]
+    trainer = train(make(loaded), loaded, tmp_path, 3, callbacks=callbacks, check_val_every_n_epoch=2)
+    said = capsys.readouterr()
+    lines = [line for line in said.out.splitlines() if line.startswith("epoch")]
+    assert [line.partition(":")[0] for line in lines] == ["epoch 1 of 3", "epoch 2 of 3", "epoch 3 of 3"]
+    assert ["val/age" in line for line in lines] == [False, True, False]
+    assert lines[2].endswith(f"train/loss {trainer.callback_metrics['train/loss']:.4g}")
+    assert "\r" not in said.out + said.err
+
+
+def test_a_terminal_has_a_bar_and_no_lines(loaded, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    train(make(loaded), loaded, tmp_path, 1, callbacks=[EpochLines()])
+    assert "epoch" not in capsys.readouterr().out
+
+
+def test_validation_leaves_training_as_it_was(loaded, tmp_path):
+    weights = []
+    for callbacks in ([], [ValidationErrors(pairs=2, points=20)]):
+        module = make(loaded)
+        train(module, loaded, tmp_path, 2, callbacks=callbacks)
+        weights.append(module.network.embed.weight.detach().clone())
+    torch.testing.assert_close(*weights)

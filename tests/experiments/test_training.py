@@ -1,0 +1,152 @@
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from datetime import timedelta
+from functools import partial
+
+import lightning as L
+import numpy as np
+import pytest
+import torch
+from lightning.pytorch.callbacks import TQDMProgressBar
+from lightning.pytorch.loggers import CSVLogger
+
+from csm.data.base import DataModule
+from csm.descriptors.base import record
+from csm.errors import ConfigError, DataError
+from csm.experiments import training as module
+from csm.experiments.callbacks import EpochLines, ValidationErrors
+from csm.experiments.tensorboard import TensorBoardPanels
+from csm.experiments.training import Training, default_callbacks, fit, last_checkpoint, make_module
+from csm.matching.network import NetworkMethod, load_model
+from tests.experiments.toys import a_training
+from tests.learning.toys import NETWORK, QUICK
+from tests.shapes import blob
+
+
+def test_a_training_leaves_a_checkpoint_an_export_and_its_numbers(tmp_path):
+    training = a_training(tmp_path, 2, callbacks=[ValidationErrors(pairs=2, points=20)])
+    trained = fit(training, tmp_path / "run")
+    assert trained.checkpoint == tmp_path / "run/model.ckpt"
+    assert {p.name for p in (tmp_path / "run").iterdir()} == {"model.ckpt", "export", "checkpoints"}
+    assert last_checkpoint(tmp_path / "run").is_file()
+    assert {"train/loss", "val/loss", "val/age", "val/exact"} <= set(trained.measured)
+    assert trained.seconds > 0
+    store = training.data.store
+    wanted = NetworkMethod(trained.module).describe(blob(2), store).features
+    for path in (trained.checkpoint, tmp_path / "run/export/model.json"):
+        torch.testing.assert_close(load_model(path).describe(blob(2), store).features, wanted, rtol=0, atol=0)
+    assert load_model(trained.checkpoint).key == NetworkMethod(trained.module).key
+
+
+def test_a_checkpoint_knows_how_it_came_about(tmp_path):
+    training = a_training(tmp_path, seed=5)
+    known = load_model(fit(training, tmp_path / "run").checkpoint).module.hparams
+    assert known["descriptor"] == record(training.data.recipe.descriptor)
+    assert (known["network"], known["basis_k"], known["lr"]) == (NETWORK, 24, 1e-2)
+    about = known["training"]
+    assert (about["name"], about["set"], about["seed"], about["epochs"]) == ("toy", "toys", 5, 1)
+    assert about["protocol"] == training.data.protocol
+    assert about["command"]
+    assert about["commit"]
+
+
+def test_a_mesh_is_read_and_the_preparation_called_once(tmp_path, monkeypatch):
+    training = a_training(tmp_path, 2, callbacks=default_callbacks())
+    read, prepared = Counter(), []
+    load, prepare = type(training.data.train_set).load, DataModule.prepare
+
+    def counting(shapes, name):
+        read[name] += 1
+        return load(shapes, name)
+
+    monkeypatch.setattr(type(training.data.train_set), "load", counting)
+    monkeypatch.setattr(DataModule, "prepare", lambda data: prepared.append(1) or prepare(data))
+    fit(training, tmp_path / "run")
+    assert read == dict.fromkeys(training.data.fit_names, 1)
+    assert prepared == [1]
+
+
+def test_without_callbacks_and_log_nothing_else_is_written(tmp_path, capsys):
+    fit(a_training(tmp_path), tmp_path / "run")
+    assert {p.name for p in (tmp_path / "run").iterdir()} == {"model.ckpt", "export", "checkpoints"}
+    assert "epoch" not in capsys.readouterr().out
+
+
+def test_a_log_is_kept_where_it_is_asked_for(tmp_path):
+    logger = partial(CSVLogger, name="csv", version="")
+    fit(a_training(tmp_path, logger=logger), tmp_path / "run")
+    assert (tmp_path / "run/csv/metrics.csv").is_file()
+
+
+def test_a_training_goes_on_from_its_last_epoch(tmp_path):
+    first = fit(a_training(tmp_path, 1), tmp_path / "run")
+    again = fit(a_training(tmp_path, 3), tmp_path / "run", last_checkpoint(tmp_path / "run"))
+    assert (first.module.hparams["training"]["epochs"], again.module.hparams["training"]["epochs"]) == (1, 3)
+    state = torch.load(again.checkpoint, weights_only=True)
+    assert (state["epoch"], state["global_step"]) == (3, 12)
+
+
+def test_a_limit_of_time_ends_a_training_and_the_checkpoint_says_after_how_many_epochs(tmp_path):
+    trainer = partial(L.Trainer, **(QUICK | {"max_epochs": 99_999, "max_time": timedelta(seconds=1)}))
+    trained = fit(a_training(tmp_path, trainer=trainer), tmp_path / "run")
+    assert 0 < load_model(trained.checkpoint).training["epochs"] < 9999
+
+
+def test_the_seed_decides_everything(tmp_path):
+    weights = [
+        fit(a_training(tmp_path, seed=seed), tmp_path / str(i)).module.network.embed.weight.detach()
+        for i, seed in enumerate((0, 0, 1))
+    ]
+    torch.testing.assert_close(weights[0], weights[1])
+    assert not torch.allclose(weights[0], weights[2])
+
+
+def test_settings_that_do_not_fit_are_errors_of_the_user(tmp_path):
+    two = partial(L.Trainer, **(QUICK | {"devices": 2}))
+    with pytest.raises(ConfigError, match=r"trainer\.devices=2: csm trains on one device"):
+        fit(a_training(tmp_path, trainer=two), tmp_path / "run")
+    with pytest.raises(ConfigError, match=r"data\.basis_k=64"):
+        fit(a_training(tmp_path, network=NETWORK | {"ks": 64}), tmp_path / "run")
+    with pytest.raises(ConfigError, match="descriptor=xyz"):
+        fit(a_training(tmp_path, options={"rotate": True}), tmp_path / "run")
+
+
+def test_training_shapes_that_cannot_be_used_are_listed(tmp_path):
+    training = a_training(tmp_path)
+    (tmp_path / "toys/toy2.off").write_text("OFF\n3 1 0\n0 0 0\n")
+    with pytest.raises(DataError, match=r"1 of 4 shapes cannot be used:\ntoys/toy2 "):
+        fit(training, tmp_path / "run")
+    assert not (tmp_path / "run/model.ckpt").exists()
+
+
+def test_the_default_callbacks_are_those_of_the_command(tmp_path):
+    errors, panels, lines = default_callbacks(seed=7)
+    assert isinstance(errors, ValidationErrors)
+    assert errors.protocol.seed == 7
+    assert (type(panels), type(lines)) == (TensorBoardPanels, EpochLines)
+    one, other = (Training("a", None, NETWORK).callbacks for _ in range(2))  # type: ignore[arg-type]
+    assert one[0] is not other[0]
+
+
+def test_panels_get_the_settings_of_the_training_unless_they_have_some(tmp_path):
+    empty, own = TensorBoardPanels(), TensorBoardPanels({"mine": 1})
+    module._make_trainer(a_training(tmp_path, callbacks=[empty, own], settings={"seed": 3}), tmp_path)
+    assert (empty.hparams, own.hparams) == ({"seed": 3}, {"mine": 1})
+
+
+@pytest.mark.parametrize(("terminal", "wanted", "bar"), [(1, 1, 1), (0, 1, 0), (1, 0, 0), (0, 0, 0)])
+def test_a_bar_is_for_terminals(tmp_path, monkeypatch, terminal, wanted, bar):
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: bool(terminal))
+    trainer = partial(L.Trainer, **(QUICK | {"enable_progress_bar": bool(wanted)}))
+    made = module._make_trainer(a_training(tmp_path, trainer=trainer), tmp_path)
+    assert isinstance(made.progress_bar_callback, TQDMProgressBar) == bool(bar)
+
+
+def test_a_module_is_made_for_the_shapes_of_the_data(tmp_path):
+    training = a_training(tmp_path)
+    made = make_module(training, n_features=16, epochs=9)
+    assert made.network.classifier.weight.shape[0] == training.data.n_classes == 162
+    assert made.hparams["training"]["epochs"] == 9
+    assert np.isclose(made.lr, 1e-2)
