@@ -1,11 +1,4 @@
-"""Colours of vertices: by position, by side, by value; and their way across a map.
-
-Which way a map goes is in the name of the function.  A map is a vector with one entry per vertex of its *from* side
-that holds a vertex of its *to* side, or -1:
-
-- `pull_colors` paints the *from* side with colours of the *to* side (each vertex takes the colour of its image);
-- `push_colors` paints the *to* side with colours of the *from* side (vertices that nothing is mapped to stay grey).
-"""
+"""Colours of vertices: by position, by value, and transferred along a map."""
 
 from __future__ import annotations
 
@@ -15,7 +8,7 @@ import numpy as np
 from matplotlib import colormaps
 from numpy.typing import ArrayLike, NDArray
 
-from csm._types import BoolArray, FloatArray, IntArray
+from csm._types import FloatArray, IntArray
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.viewer.camera import Axis, body_axes
@@ -24,7 +17,6 @@ from csm.viewer.shade import encoded
 Colors: TypeAlias = NDArray[np.uint8]
 
 UNMATCHED = (168, 168, 168)
-LEFT, RIGHT = (214, 96, 77), (67, 127, 180)
 ERROR_COLORMAP = "YlOrRd"
 _BINS = 32
 _GREY: Colors = np.array(UNMATCHED, dtype=np.uint8)
@@ -63,20 +55,6 @@ def position_colors(mesh: Mesh, *, up: Axis | Literal["auto"] = "auto") -> Color
     return _from_oklab(lab)
 
 
-def left_of(mesh: Mesh, *, up: Axis | Literal["auto"] = "auto") -> BoolArray:
-    """Return which vertices (N,) are on the shape's own left: the viewer's right in the front view.
-
-    The dividing plane goes through the middle of the shape, so this suits a symmetric pose.
-    """
-    right = mesh.vertices @ body_axes(mesh, up)[0]
-    return np.asarray(right > 0.5 * (right.min() + right.max()))
-
-
-def two_tone(left: BoolArray) -> Colors:
-    """Colour vertices (N,) red on the left and blue on the right; carried over a map, this shows left-right flips."""
-    return np.where(np.asarray(left)[:, None], np.array(LEFT, np.uint8), np.array(RIGHT, np.uint8))
-
-
 def scalar_colors(
     values: ArrayLike, low: float | None = None, high: float | None = None, colormap: str = "viridis"
 ) -> Colors:
@@ -108,14 +86,14 @@ def scalar_colors(
 
 
 def pull_colors(to_colors: ArrayLike, indices: IntArray) -> Colors:
-    """Paint the from side: each vertex takes the colour of the vertex that it is mapped to, grey without one.
+    """Transfer colours along a map: each vertex takes the colour of the vertex that it is mapped to, grey without one.
 
     Parameters
     ----------
     to_colors
-        Shape (n_to, 3), uint8.
+        Shape (n_to, 3), uint8: the colours of the shape that the map goes to.
     indices
-        Shape (n_from,), the map: vertices of the to side, or -1.
+        Shape (n_from,), the map: vertices of the shape that it goes to, or -1.
 
     Returns
     -------
@@ -130,38 +108,6 @@ def pull_colors(to_colors: ArrayLike, indices: IntArray) -> Colors:
     colors, indices = np.asarray(to_colors, dtype=np.uint8), np.asarray(indices)
     _require_map(indices, len(colors))
     return np.where(indices[:, None] >= 0, colors[indices], _GREY)
-
-
-def push_colors(from_colors: ArrayLike, indices: IntArray, n_to: int) -> Colors:
-    """Paint the to side: each vertex takes the colour of the first vertex that is mapped to it, grey without one.
-
-    Parameters
-    ----------
-    from_colors
-        Shape (n_from, 3), uint8.
-    indices
-        Shape (n_from,), the map: vertices of the to side, or -1.
-    n_to
-        Number of vertices of the to side.
-
-    Returns
-    -------
-    Colors
-        Shape (n_to, 3), uint8.
-
-    Raises
-    ------
-    ConfigError
-        If there is not one colour per entry of the map or the map leaves 0..n_to-1.
-    """
-    colors, indices = np.asarray(from_colors, dtype=np.uint8), np.asarray(indices)
-    _require_map(indices, n_to)
-    if colors.shape != (len(indices), 3):
-        raise ConfigError(f"colours have shape {colors.shape}, wanted ({len(indices)}, 3): one per entry of the map")
-    painted = np.tile(_GREY, (n_to, 1))
-    reached, first = np.unique(indices, return_index=True)
-    painted[reached[reached >= 0]] = colors[first[reached >= 0]]
-    return painted
 
 
 def _require_map(indices: IntArray, n_to: int) -> None:

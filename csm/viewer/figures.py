@@ -86,32 +86,6 @@ def cqc_figure(curves: Curves, *, normaliser: str = "diameter", limit: float | N
     return figure
 
 
-def error_histogram(errors: Mapping[str, FloatArray], *, normaliser: str = "diameter", bins: int = 60) -> Figure:
-    """Plot how errors (P,) are distributed, one outline per method, on a logarithmic scale of frequency.
-
-    Exact matches would hide all else, so they are counted in the legend and not drawn.
-
-    Raises
-    ------
-    ConfigError
-        If a method has no error.
-    """
-    if not errors or any(np.size(e) == 0 for e in errors.values()):
-        raise ConfigError(f"error histogram: wanted errors of at least one method, got {list(errors)}")
-    figure, axes = new_figure(5.2, 3.6)
-    edges = np.linspace(0, max(float(np.max(e)) for e in errors.values()) or 1.0, bins + 1)
-    for k, (name, values) in enumerate(errors.items()):
-        counts, _ = np.histogram(values[values > 0], edges)
-        exact = 100 * float(np.mean(values == 0))
-        axes.stairs(100 * counts / len(values), edges, label=f"{name} ({exact:.1f} % exact)", **line_style(k))
-    axes.set_yscale("log")
-    axes.set_xlim(0, edges[-1])
-    axes.set_xlabel(_error_label(normaliser))
-    axes.set_ylabel("matches per bin (%)")
-    axes.legend(frameon=False)
-    return figure
-
-
 def filters_figure(evals: ArrayLike, responses: Mapping[str, NDArray[np.floating]]) -> Figure:
     """Plot learned spectral filters over the eigenvalues, one panel per layer.
 
@@ -212,7 +186,7 @@ def figure_to_array(figure: Figure, dpi: float = _DPI) -> Picture:
 
 
 def save_figure(path: str | os.PathLike[str], figure: Figure, dpi: float = 200) -> None:
-    """Write a figure as .png, .pdf or .svg; the file is there whole or not at all.
+    """Write a figure as .png, .pdf or .svg; the file is written completely or not at all.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Pages that stand alone: text, tables, pictures and meshes in one html file that loads nothing from anywhere.
+"""Self-contained pages: text, tables, pictures and meshes in one html file that requests nothing from a server.
 
 The page forbids itself every request by a content security policy; whatever a caller gives as text is escaped.
 """
@@ -59,24 +59,6 @@ class Table:
             if len(row) != len(self.columns):
                 raise ConfigError(f"table: row {i} has {len(row)} cells, but there are {len(self.columns)} columns")
 
-    @classmethod
-    def from_markdown(cls, text: str, caption: str = "") -> Table:
-        r"""Read a table in markdown, as `csm.evaluation.tables` writes it: title line, rule, rows; ``\|`` is a bar.
-
-        Raises
-        ------
-        ConfigError
-            If the text is not such a table.
-        """
-        lines = [line.strip() for line in text.strip().splitlines()]
-        if len(lines) < 2 or not all(line.startswith("|") and line.endswith("|") for line in lines):
-            raise ConfigError("table: wanted markdown lines that begin and end with a bar, the second one a rule")
-        cells = [
-            [cell.strip().replace("\\|", "|") for cell in re.split(r"(?<!\\)\|", line[1:-1])]
-            for line in (lines[0], *lines[2:])
-        ]
-        return cls(cells[0], cells[1:], caption)
-
 
 @dataclass(frozen=True, eq=False)
 class Figure:
@@ -135,7 +117,7 @@ def viewer_html(title: str, viewer: Viewer, *, text: str = "", footer: str = "")
 
 
 def write_html(path: str | os.PathLike[str], page: str) -> None:
-    """Write a page as UTF-8; the file is there whole or not at all."""
+    """Write a page as UTF-8; the file is written completely or not at all."""
     with atomic_path(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
 

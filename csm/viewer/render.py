@@ -15,11 +15,9 @@ from csm._types import Float32Array, FloatArray, IntArray
 from csm.errors import ConfigError, MeshError
 from csm.mesh.shape import Mesh
 from csm.viewer.camera import View, project, rotation
-from csm.viewer.picture import Picture, contact_sheet, save_png
+from csm.viewer.picture import Picture
 from csm.viewer.raster import Fragments, fragments_at, interpolate, visible_faces
-from csm.viewer.shade import creases, edge_ink, encoded, light, linear
-
-__all__ = ["Picture", "View", "as_colors", "contact_sheet", "render", "save_png"]
+from csm.viewer.shade import creases, encoded, light, linear
 
 DEFAULT_COLOR = (196, 203, 214)
 
@@ -32,7 +30,6 @@ def render(
     view: View | None = None,
     background: Literal["white", "transparent"] = "white",
     lighting: bool = True,
-    wireframe: bool = False,
     supersample: int = 2,
 ) -> Picture:
     """Draw a mesh.
@@ -51,8 +48,6 @@ def render(
         "white" gives three channels, "transparent" four with straight (not premultiplied) alpha.
     lighting
         False paints the plain colours, so that they can be read off exactly.
-    wireframe
-        Draw the edges of the triangles.
     supersample
         Samples per pixel along each axis; 2 is quick, 4 is for print.
 
@@ -79,8 +74,6 @@ def render(
     surface = interpolate(seen.weights, vertex_colors, mesh.faces[seen.face])
     if lighting:
         surface = light(surface, _normals(mesh, view, seen), creases(seen.depth, covered, (height, width)))
-    if wireframe:
-        surface *= edge_ink(triangles, seen, half_width=0.5 * supersample)[:, None]
     return _finish(surface, covered, size, supersample, background)
 
 

@@ -10,7 +10,7 @@ from html import escape
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from csm._types import FloatArray, IntArray
 from csm.errors import ConfigError, MeshError
@@ -129,11 +129,6 @@ class Viewer:
 def pack(array: ArrayLike, kind: str) -> str:
     """Write an array as base64 of its little-endian bytes of a numpy kind such as "f4"."""
     return base64.b64encode(np.ascontiguousarray(array, dtype=f"<{kind}").tobytes()).decode("ascii")
-
-
-def unpack(text: str, kind: str) -> NDArray[Any]:
-    """Read what `pack` wrote, as a flat array."""
-    return np.frombuffer(base64.b64decode(text), dtype=f"<{kind}")
 
 
 def scene_json(viewer: Viewer) -> str:

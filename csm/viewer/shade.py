@@ -1,4 +1,4 @@
-"""Light, creases, edges and the sRGB curve: from what is seen in a pixel to its colour."""
+"""Light, creases and the sRGB curve: from what is seen in a pixel to its colour."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from csm._types import Float32Array, FloatArray, IntArray
-from csm.viewer.raster import Fragments
 
 
 def _unit(*direction: float) -> Float32Array:
@@ -53,16 +52,6 @@ def creases(depth: Float32Array, covered: IntArray, shape: tuple[int, int]) -> F
     weight, blurred = (gaussian_filter(a, radius, truncate=2, mode="constant")[here] for a in (mask, field))
     behind: Float32Array = np.clip((depth - blurred / np.maximum(weight, np.float32(1e-6))) / (4 * radius), 0, 1)
     return behind.astype(np.float32, copy=False)
-
-
-def edge_ink(triangles: FloatArray, seen: Fragments, half_width: float) -> Float32Array:
-    """Return a factor per fragment (P,), below 1 within `half_width` pixels of an edge of its triangle."""
-    d1, d2 = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-    double_area = np.abs(d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0])
-    opposite = np.roll(triangles, -1, axis=1) - np.roll(triangles, 1, axis=1)
-    heights = double_area[:, None] / np.maximum(np.linalg.norm(opposite[..., :2], axis=2), 1e-9)
-    distance = (seen.weights * heights[seen.face]).min(axis=1)
-    return np.where(distance < half_width, 0.4, 1.0).astype(np.float32)
 
 
 def linear(srgb: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Colours: smooth over the surface, different left and right, and carried the right way across a map."""
+"""Colours: smooth over the surface, different on the left and on the right, and transferred along a map."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 from matplotlib import colormaps
 
 from csm.errors import ConfigError
-from csm.viewer.colors import UNMATCHED, left_of, position_colors, pull_colors, push_colors, scalar_colors, two_tone
+from csm.viewer.colors import UNMATCHED, position_colors, pull_colors, scalar_colors
 from tests.shapes import blob, sphere
 
 RED, GREEN, BLUE = [255, 0, 0], [0, 255, 0], [0, 0, 255]
@@ -39,15 +39,6 @@ def test_position_colours_do_not_depend_on_scale_place_or_vertex_order() -> None
     assert np.abs(difference).max() <= 1
 
 
-def test_sides_are_the_shape_s_own() -> None:
-    mesh = sphere(2)
-    left = left_of(mesh, up="y")  # the front is +z, so its own left is +x
-    np.testing.assert_array_equal(
-        left[np.abs(mesh.vertices[:, 0]) > 0.01], mesh.vertices[np.abs(mesh.vertices[:, 0]) > 0.01, 0] > 0
-    )
-    assert len(np.unique(two_tone(left), axis=0)) == 2
-
-
 def test_scalar_colours_follow_the_colour_map_and_grey_the_unknown() -> None:
     colors = scalar_colors([0.0, 0.5, 1.0, 7.0, -1.0, np.nan], low=0.0, high=1.0)
     expected = colormaps["viridis"]([0.0, 0.5, 1.0, 1.0, 0.0], bytes=True)[:, :3]
@@ -68,25 +59,7 @@ def test_pull_takes_the_colour_of_the_image() -> None:
     np.testing.assert_array_equal(pulled, [BLUE, BLUE, UNMATCHED, RED])
 
 
-def test_push_paints_what_is_reached_and_the_first_wins() -> None:
-    pushed = push_colors([RED, GREEN, BLUE, RED], np.array([3, 1, 1, -1]), 5)
-    np.testing.assert_array_equal(pushed, [UNMATCHED, GREEN, UNMATCHED, RED, UNMATCHED])
-
-
-def test_push_and_pull_undo_each_other_on_a_bijection() -> None:
-    rng = np.random.default_rng(0)
-    colors, order = rng.integers(0, 256, (50, 3), dtype=np.uint8), rng.permutation(50)
-    np.testing.assert_array_equal(pull_colors(push_colors(colors, order, 50), order), colors)
-
-
 @pytest.mark.parametrize("indices", [np.array([0, 3]), np.array([-2, 0]), np.array([0.5, 1.0]), np.array([[0, 1]])])
 def test_maps_that_leave_the_shape_are_refused(indices: np.ndarray) -> None:
     with pytest.raises(ConfigError, match="map"):
         pull_colors([RED, GREEN, BLUE], indices)
-    with pytest.raises(ConfigError, match="map"):
-        push_colors([RED, GREEN], indices, 3)
-
-
-def test_push_needs_one_colour_per_entry() -> None:
-    with pytest.raises(ConfigError, match="one per entry"):
-        push_colors([RED], np.array([0, 1]), 2)

@@ -12,11 +12,10 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from PIL import Image
 
-from csm.data.shapeset import Shape
 from csm.errors import ConfigError
-from csm.evaluation.protocol import Protocol, evaluate_matches
-from csm.mesh.correspondence import PointMap
-from csm.mesh.shape import Mesh
+from csm.evaluation.distances import Lengths, MatchedPoints, PointErrors
+from csm.evaluation.protocol import EvaluationProtocol
+from csm.evaluation.results import PairErrors, summarise
 from csm.viewer import figures
 from csm.viewer.camera import View
 from csm.viewer.colors import position_colors, pull_colors
@@ -24,7 +23,6 @@ from csm.viewer.figures import (
     Curve,
     correspondence_figure,
     cqc_figure,
-    error_histogram,
     figure_to_array,
     filters_figure,
     save_figure,
@@ -51,25 +49,19 @@ def test_cqc_shows_every_method_with_its_mean_error() -> None:
 
 
 def test_cqc_of_an_evaluation_takes_its_normaliser() -> None:
-    mesh = blob(1)
-    shapes = [Shape(Mesh(mesh.vertices, mesh.faces, name), PointMap.identity(mesh.n_vertices)) for name in "ab"]
-    protocol = Protocol(distance="edge", normaliser="sqrt_area")
-    result = evaluate_matches(shapes, lambda s, t: np.arange(mesh.n_vertices), protocol, progress=False)
+    points = np.arange(4)
+    measured = PairErrors(
+        ("a", "b"),
+        MatchedPoints(points, points, points, np.ones(4, dtype=bool)),
+        PointErrors(np.array([0.0, 0.2, 0.4, 0.2]), None, 0, 0.0),
+        Lengths(diameter=4.0, sqrt_area=2.0),
+    )
+    result = summarise([measured], EvaluationProtocol(normaliser="sqrt_area"), 0.0, method="identity")
     figure = cqc_figure({"identity": result})
     assert "square root of the area" in figure.axes[0].get_xlabel()
-    assert legend(figure) == ["identity (AGE 0.0)"]
+    assert legend(figure) == ["identity (AGE 100.0)"]
     with pytest.raises(ConfigError, match="2 normalisers"):
         cqc_figure({"identity": result, "bare": Curve(T, T, 0.1)})
-
-
-def test_histogram_counts_all_that_is_not_exact() -> None:
-    errors = np.array([0.0, 0.0, 0.0, 0.1, 0.2, 0.2, 0.3, 0.4])
-    figure = error_histogram({"ours": errors}, bins=4)
-    stairs = figure.axes[0].patches[0].get_data()
-    assert stairs.values.sum() == pytest.approx(100 * 5 / 8)
-    assert legend(figure) == ["ours (37.5 % exact)"]
-    assert "geodesic error" in figure.axes[0].get_xlabel()
-    assert figure.axes[0].get_ylabel()
 
 
 def test_filters_have_a_panel_per_layer_and_a_line_per_filter() -> None:
@@ -109,12 +101,10 @@ def test_what_does_not_fit_is_refused() -> None:
         correspondence_figure(mesh, mesh, np.arange(3))
     with pytest.raises(ConfigError, match="0 curves"):
         cqc_figure({})
-    with pytest.raises(ConfigError, match="at least one method"):
-        error_histogram({"ours": np.array([])})
     with pytest.raises(ConfigError, match="conv2"):
         filters_figure(np.arange(4), {"conv1": np.zeros((4, 2)), "conv2": np.zeros((5, 2))})
     with pytest.raises(ConfigError, match="normaliser='mile'"):
-        error_histogram({"ours": np.ones(3)}, normaliser="mile")
+        cqc_figure({"ours": Curve(T, T / 0.25, 0.1)}, normaliser="mile")
 
 
 def test_pixels_of_a_figure_are_those_of_its_file(tmp_path: Path) -> None:
@@ -137,4 +127,4 @@ def test_files_are_the_same_every_time(tmp_path: Path, suffix: str) -> None:
 def test_pyplot_and_its_global_state_are_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)  # importing it now fails
     module = runpy.run_path(figures.__file__)
-    assert module["error_histogram"]({"ours": np.ones(3)}).axes
+    assert module["cqc_figure"]({"ours": (T, T / 0.25, 0.1)}).axes

@@ -101,12 +101,7 @@ def test_numbers_stand_to_the_right() -> None:
     assert cells == 2 * [None, *4 * ["number"]]
 
 
-def test_markdown_tables_are_read_back() -> None:
-    table = Table.from_markdown("| a \\| b | c |\n|---|---|\n| 1 | two words |\n| | x |\n", "caption")
-    assert table == Table(["a | b", "c"], [["1", "two words"], ["", "x"]], "caption")
-    for wrong in ("", "| a |", "a, b\n1, 2"):
-        with pytest.raises(ConfigError, match="table"):
-            Table.from_markdown(wrong)
+def test_a_row_with_another_number_of_cells_is_refused() -> None:
     with pytest.raises(ConfigError, match="row 1 has 1 cells"):
         Table(["a", "b"], [[1, 2], [3]])
 

@@ -92,17 +92,6 @@ def test_light_comes_from_above_and_the_inside_is_lit() -> None:
     np.testing.assert_array_equal(inside, render(sheets(0.0), size=(20, 20), view=FLAT))
 
 
-def test_wireframe_darkens_edges_only() -> None:
-    options = {"size": (80, 80), "view": FLAT, "lighting": False}
-    plain, wired = (
-        render(sheets(0.0), (200, 200, 200), **options),
-        render(sheets(0.0), (200, 200, 200), wireframe=True, **options),
-    )
-    assert (wired <= plain).all()
-    assert (wired[40, 40] < plain[40, 40]).all()  # on the diagonal
-    assert (wired[25, 60] == plain[25, 60]).all() or (wired[60, 25] == plain[60, 25]).all()
-
-
 def test_shape_outside_the_picture_and_flat_shapes_are_drawn_without_failing() -> None:
     far = Mesh(np.concatenate([sheets(0.0).vertices, [[50, 50, 50]]]), sheets(0.0).faces)  # the last vertex has no face
     assert (render(far, RED, size=(20, 20), view=FLAT, lighting=False)[10, 10] == RED).all()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
 from html.parser import HTMLParser
@@ -14,7 +15,7 @@ from csm.errors import ConfigError, MeshError
 from csm.mesh.shape import Mesh
 from csm.viewer.camera import View
 from csm.viewer.colors import position_colors, pull_colors
-from csm.viewer.scene import Panel, Viewer, pack, scene_json, unpack, viewer_block
+from csm.viewer.scene import Panel, Viewer, pack, scene_json, viewer_block
 from tests.shapes import blob, sphere
 
 NASTY = "</script><script>alert('1 & \"2\"')</script><!--"
@@ -30,6 +31,11 @@ def a_pair(label: str = "source") -> Viewer:
     return Viewer(
         [Panel(source, pull_colors(reference, indices), label, indices, errors), Panel(target, reference)], reference=1
     )
+
+
+def unpack(text: str, kind: str) -> np.ndarray:
+    """Read what `pack` wrote, as the script of the page does: a flat array of little-endian numbers."""
+    return np.frombuffer(base64.b64decode(text), dtype=f"<{kind}")
 
 
 @pytest.mark.parametrize("kind", ["f4", "u1", "u2", "u4", "i4"])
