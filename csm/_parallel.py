@@ -39,7 +39,7 @@ def parallel_map(
     total: int | None = None,
     progress: bool = True,
 ) -> list[R]:
-    """Return what `function` gives for every task, in their order.
+    """Apply a function to every task, and return the results in the order of the tasks.
 
     Parameters
     ----------

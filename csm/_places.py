@@ -8,7 +8,7 @@ from typing import Any
 
 
 def load(place: str) -> Any:
-    """Import what stands behind a place such as "csm.descriptors.acd:ACD.paper": a module, a colon, a name in it.
+    """Import an object by its place, such as "csm.descriptors.acd:ACD.paper": a module, a colon, a name in it.
 
     Examples
     --------

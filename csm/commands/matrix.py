@@ -26,7 +26,12 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     table = fill(cfg, rows_of(cfg))
     if cfg.results:
         add_rows(cfg.results, table)
-    return {f"age/{row.method}/{row.test}": row.age for row in table}
+    return {f"age/{row.method}/{row.test}{_kind(row)}": row.age for row in table}
+
+
+def _kind(row: ResultRow) -> str:
+    """Say how a row was matched, if not by the nearest neighbour."""
+    return "" if row.matching == "nearest" else f", {row.matching}"
 
 
 def fill(cfg: DictConfig, rows: Sequence[Row]) -> list[ResultRow]:
@@ -67,7 +72,7 @@ def _row(cfg: DictConfig, name: str, seed: int) -> Row:
 
 
 def identity_of(cfg: DictConfig) -> dict[str, Any]:
-    """Return what a training depends on, flat: seed, data without their place and test sets, network, optimisation."""
+    """Return the settings that a training depends on, flat; the places of data and the test sets are none of them."""
     settings: Any = plain(cfg)
     found: dict[str, Any] = {"seed": settings["seed"]}
     for group in ("data", "descriptor", "model", "optimizer", "learning"):

@@ -18,7 +18,7 @@ register("data", "descriptor", "model")
 
 
 def run(cfg: DictConfig) -> dict[str, Any]:
-    """Do what ``action`` says; return counts."""
+    """Fill, check or prune the store, and return counts."""
     if cfg.action == "check":
         return check_store(Store(cfg.store))
     if cfg.action == "prune":

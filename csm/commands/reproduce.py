@@ -35,7 +35,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
 
 
 def make_studies(cfg: DictConfig, names: Sequence[str]) -> dict[str, Any]:
-    """Make studies by name, print and write what they find, and return how long each took.
+    """Run studies by name, print and write their findings, and return the seconds that each took.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def fill_matrix(cfg: DictConfig, experiment: str, folder: Path, overrides: Seque
 
 
 def conclude(findings: Findings, out: Path, results: str | None, seconds: float) -> None:
-    """Write what a study found into its folder, copy it into `results` if that is given, and print it."""
+    """Write the findings of a study into its folder, copy them into `results` if that is given, and print them."""
     files = [*write_findings(findings, out, provenance(), seconds), *findings.pictures]
     if results:
         for path in files:

@@ -1,4 +1,4 @@
-"""The data module that every data set derives from, and what the file of a data set declares.
+"""The base class of the data modules, and the declaration that every file of a data set ends with.
 
 Nothing here needs PyTorch or Lightning; `csm.learning.loading` turns a data module into what Lightning's trainer takes.
 """

@@ -31,7 +31,7 @@ DATA_SETS = {
 
 
 def data_set(name: str) -> DataSet:
-    """Return what the file of a data set declares.
+    """Return the declaration of a data set: its data module, layouts and splits.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What an evaluation keeps in memory, as a shape takes part in many pairs: shapes and descriptions used last."""
+"""A bounded cache of shapes and descriptions, because a shape takes part in many pairs."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ _BYTES_PER_VERTEX = 300  # of a mesh with its map and what is derived from it
 
 
 class Recent(Generic[T]):
-    """Remember what a function gave last, as far as that fits into a number of bytes; the last one always stays.
+    """A cache of a function's latest results, bounded by their size; the newest result always stays.
 
     Parameters
     ----------
     make
-        The function, of any names.
+        The function, called with names.
     size
-        How many bytes something takes.
+        Called with a result: its size in bytes.
     limit
-        How many bytes there are.
+        Bytes that all results may take together.
     """
 
     def __init__(self, make: Callable[..., T], size: Callable[[T], int], limit: int) -> None:
@@ -36,7 +36,7 @@ class Recent(Generic[T]):
         self._bytes = 0
 
     def __call__(self, *names: str) -> T:
-        """Return what the function gives for these names."""
+        """Return the function's result for these names, from the cache if it is there."""
         if names not in self._kept:
             self._kept[names] = self._make(*names)
             self._bytes += self._size(self._kept[names])
@@ -47,21 +47,21 @@ class Recent(Generic[T]):
 
 
 class Memory:
-    """The shapes of a set and what methods say of them.
+    """The shapes of a set, and their descriptions by methods.
 
     Parameters
     ----------
     shapes, methods, store, device
         As in `csm.evaluation.targets.Plan`.
     limit
-        How many bytes of shapes, and of descriptions, are kept.
+        Bytes of shapes, and bytes of descriptions, that stay in memory.
 
     Attributes
     ----------
     shape
-        Called with the name of a shape: the shape, with its map from the template.
+        Called with the name of a shape; returns it with its map from the template.
     described
-        Called with the names of a method and a shape: what the method says of it.
+        Called with the names of a method and a shape; returns the description.
     """
 
     def __init__(

@@ -231,7 +231,7 @@ def to_arrays(pairs: Sequence[PairErrors]) -> Arrays:
 
 
 def from_arrays(a: Arrays, pairs: Sequence[tuple[str, str]]) -> list[PairErrors]:
-    """Return what `to_arrays` was given, for these pairs, with distances in single precision."""
+    """Return the measured pairs that `to_arrays` made arrays of, with distances in single precision."""
     lengths = Lengths(*(float(x) for x in a["lengths"]))
     columns = ("source", "truth", "matched", "exact", "distance")
     parts = [np.split(a[name], np.cumsum(a["points"])[:-1]) for name in columns]

@@ -75,11 +75,11 @@ class Plan:
 
 
 class Matches(NamedTuple):
-    """What there is to measure on one target.
+    """The matched points of one target, which are to be measured.
 
-    `points` has for every cell an entry per source; `left` has for every perturbation the fraction of vertices that it
-    leaves; `keys` has for every cell what its result is kept under; `kept` are results that are there already; `failed`
-    says why a cell cannot be measured.
+    `points` has an entry per source for every cell; `left` has for every perturbation the fraction of vertices that it
+    leaves; `keys` are the cache keys of the cells; `kept` are the stored results of earlier runs; `failed` says why a
+    cell cannot be measured.
     """
 
     mesh: Mesh
@@ -121,7 +121,7 @@ def matched_tasks(tasks: Iterator[TargetTask], memory: Memory) -> Iterator[Targe
 
 
 def match_target(task: TargetTask, memory: Memory) -> Matches:
-    """Match every source onto the target in every cell whose result is not kept."""
+    """Match every source onto the target, in every cell that has no stored result."""
     plan, target = task.plan, memory.shape(task.target)
     maps = "" if plan.results is None else _digest([target, *map(memory.shape, task.sources)])
     matches = Matches(target.mesh, {}, {}, {}, {}, {})
@@ -210,7 +210,7 @@ def measure_target(task: TargetTask) -> Found:
 
 
 def _errors(task: TargetTask, matches: Matches) -> dict[Cell, list[PairErrors]]:
-    """Measure all points together, as most of them are the same, and keep the results."""
+    """Measure the points of all cells together, because most are the same, and store the results."""
     plan, together = task.plan, [points for of_cell in matches.points.values() for points in of_cell]
     memo = plan.store if plan.protocol.distance == "exact" else None
     measured = target_errors(matches.mesh, together, plan.protocol.distance, plan.protocol.normaliser, memo)
@@ -229,7 +229,7 @@ def _errors(task: TargetTask, matches: Matches) -> dict[Cell, list[PairErrors]]:
 
 
 def _is_kept(task: TargetTask, cell: Cell, maps: str, changed: Damaged | None, matches: Matches) -> bool:
-    """Tell whether the result of a cell is kept, and note it, and what it is kept under."""
+    """Tell whether the result of a cell is stored; note its cache key, and the result if it is there."""
     if task.plan.results is None:
         return False
     matches.keys[cell] = _key(task.plan, cell, maps, changed)
@@ -255,7 +255,7 @@ def _digest_of_change(changed: Damaged) -> str:
 
 
 def _key(plan: Plan, cell: Cell, maps: str, changed: Damaged | None) -> dict[str, Any]:
-    """Return everything that the result of a cell on one target depends on."""
+    """Return the cache key of a cell on one target: everything that its result depends on."""
     asked = {name: value for name, value in asdict(plan.protocol).items() if name not in ("pairs", "sample")}
     return {
         "method": dict(plan.methods[cell.method].key),

@@ -1,4 +1,4 @@
-"""From prepared arrays to the tensors that a network takes, and what a network needs to have prepared."""
+"""From prepared arrays to the tensors of a network, and the recipe of what a network needs."""
 
 from __future__ import annotations
 
@@ -84,6 +84,6 @@ def stencils_for(network: Mapping[str, Any]) -> tuple[Stencil, ...]:
 
 
 def recipe_of(hparams: Mapping[str, Any]) -> Recipe:
-    """Return what a trained network, given by the hyper-parameters of its checkpoint, needs to have prepared."""
+    """Return the recipe of a trained network, given by the hyper-parameters of its checkpoint."""
     descriptor = from_parameters(**hparams["descriptor"])
     return Recipe(descriptor, hparams["basis_k"], stencils_for(hparams["network"]))

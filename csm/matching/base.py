@@ -1,4 +1,4 @@
-"""What matchers are given and what they are: descriptions of two meshes, and a rule that makes a map of them."""
+"""Descriptions of meshes, and the base class of the matchers that make maps from them."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def require_device(device: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Described:
-    """A mesh with what a method says of it.
+    """A mesh with its description by a method.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ class Memo(Protocol):
     """Where results are looked up and kept, such as `csm.data.store.Store`."""
 
     def fetch(self, kind: str, mesh: Mesh, params: Mapping[str, Any], make: Callable[[], Arrays]) -> Arrays:
-        """Return what is kept for `kind`, the geometry of `mesh` and the plain-data `params`, or make and keep it."""
+        """Return the stored arrays of this kind, geometry and parameters; compute and store them if there are none."""
         ...
 
 

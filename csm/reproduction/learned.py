@@ -104,7 +104,7 @@ def _line(method: str, rows: Sequence[ResultRow], tests: Mapping[str, str]) -> d
 
 
 def notes(rows: Sequence[ResultRow]) -> list[str]:
-    """Say how it was matched, and every protocol with the test sets, and the methods if not all, that it is of."""
+    """Return a sentence on the matching, and every protocol with its test sets and, if not all, its methods."""
     methods, by_class = {row.method for row in rows}, any(row.matching == "argmax" for row in rows)
     found = [
         "Matched by the nearest learned descriptor"
@@ -145,7 +145,7 @@ def _curve(folder: Path, row: ResultRow) -> Curve:
 
 
 def varied(matrix: FilledMatrix) -> dict[str, dict[float | str, str]]:
-    """Return what the rows of a matrix change against the first: label of the option -> value -> row, the first first.
+    """Return the options in which rows of a matrix differ from the first: label -> value -> row, the first row first.
 
     ConfigError if a row differs from the first in another number of options than one.
     """

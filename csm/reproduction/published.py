@@ -116,7 +116,7 @@ _ROWS = {
 
 
 def row_title(row: str) -> str:
-    """Return what tables and figures call a row of the experiments on learned methods, such as "faust_mgcn".
+    """Return the title, in tables and figures, of a row of the experiments on learned methods, such as "faust_mgcn".
 
     Examples
     --------
@@ -128,7 +128,7 @@ def row_title(row: str) -> str:
 
 
 def label(name: str) -> str:
-    """Return what a figure calls a preset.
+    """Return the name of a preset in figures.
 
     Examples
     --------

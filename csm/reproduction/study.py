@@ -1,4 +1,4 @@
-"""What a study is, what it is given and what it leaves behind."""
+"""The base class of the studies, their context, and the findings that they return."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class Context:
 
     @property
     def results(self) -> Store:
-        """Where what was measured is kept."""
+        """The store of measured results."""
         return Store(self.out / "targets")
 
     def evaluate(

@@ -70,7 +70,7 @@ def timed_mesh(context: Context, size: int) -> tuple[Mesh, str]:
 def measured(
     context: Context, kind: str, mesh: Mesh, question: Mapping[str, Any], measure: Callable[[], Arrays]
 ) -> Arrays:
-    """Return what was measured of a mesh to this question on such a machine; if it never was, measure and keep it."""
+    """Return a measurement from the store, or make and store it; its key has mesh, question and machine."""
     machine = f"{platform.machine()}, {os.cpu_count()} processors"
     return context.results.fetch(kind, mesh, {**question, "machine": machine}, measure)
 

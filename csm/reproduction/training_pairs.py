@@ -69,7 +69,7 @@ class _OnTrainingPairs(OnPoints):
             return HumansSet("remeshed", 5000, str(context.store.root))
 
     def errors(self, context: Context, settings: Mapping[K, Descriptor]) -> dict[K, dict[str, Any]]:
-        """Return what rows of a table say of each setting: error, standard error, and the error of each pair."""
+        """Return the numbers of each setting for a table: error, standard error, and the error of each pair."""
         shapes = self.shape_set(context)
         pairs = same_person_pairs(shapes.names, self.n_pairs, context.seed)
         different = list(dict.fromkeys(settings.values()))
@@ -86,7 +86,7 @@ class _OnTrainingPairs(OnPoints):
         }
 
     def note(self, ending: str) -> str:
-        """Say what an error is a mean of."""
+        """Return a sentence on the protocol: pairs, points, distance and unit."""
         return (
             f"error: mean over {self.n_pairs} ordered pairs of {self.points} points each, in thousandths of the "
             f"target's geodesic diameter ({self.distance} distances); {ending}"
