@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from csm._parallel import n_processes, parallel_map
-from csm._types import Arrays, Float32Array
+from csm._types import Arrays, Float32Array, FloatArray
 from csm.data.shapes import ShapeSet
 from csm.data.store import Store
 from csm.descriptors.base import Descriptor, record
@@ -46,10 +46,11 @@ class Recipe:
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A mesh with its features, shape (N, Q), and of its unit-area copy the eigenbasis and the stencils by name."""
+    """A mesh with its features, shape (N, Q), and of its unit-area copy vertex areas (N,), eigenbasis and stencils."""
 
     mesh: Mesh
     features: Float32Array
+    mass: FloatArray
     basis: Spectrum | None
     stencils: Mapping[str, Arrays] = field(default_factory=dict)
 
@@ -141,7 +142,7 @@ def prepare_mesh(mesh: Mesh, recipe: Recipe, store: Store, operators: Operators 
     stencils = {
         s.name: store.fetch(f"stencil-{s.name}", unit, s.parameters(), partial(s, operators)) for s in recipe.stencils
     }
-    return Prepared(mesh, features, basis, stencils)
+    return Prepared(mesh, features, operators.mass if basis is None else basis.mass, basis, stencils)
 
 
 def is_prepared(mesh: Mesh, recipe: Recipe, store: Store) -> bool:

@@ -46,12 +46,9 @@ class ShapeSample(NamedTuple):
 def network_input(prepared: Prepared) -> NetworkInput:
     """Convert a prepared mesh to float32 tensors; a mesh that was prepared without a basis has one of size 0."""
     spectrum = prepared.basis
-    if spectrum is None:
-        n = len(prepared.features)
-        basis = Basis(torch.zeros(0), torch.zeros(n, 0), torch.ones(n))
-    else:
-        arrays = (spectrum.evals, spectrum.evecs, spectrum.mass)
-        basis = Basis(*(torch.as_tensor(a, dtype=torch.float32) for a in arrays))
+    none = np.zeros(0), np.zeros((len(prepared.mass), 0))
+    evals, evecs = none if spectrum is None else (spectrum.evals, spectrum.evecs)
+    basis = Basis(*(torch.as_tensor(a, dtype=torch.float32) for a in (evals, evecs, prepared.mass)))
     stencils = {name: _tensors(arrays) for name, arrays in prepared.stencils.items()}
     return NetworkInput(torch.as_tensor(prepared.features), Surface(basis, stencils))
 

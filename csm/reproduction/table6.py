@@ -6,6 +6,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -174,12 +175,15 @@ def _step(module: CSMModule, optimizer: torch.optim.Optimizer, sample: ShapeSamp
 
 
 def _peak_megabytes() -> float:
-    if sys.platform == "win32":
-        return float("nan")  # it has no such count
+    status = Path("/proc/self/status")
+    if status.exists():  # on Linux the other count starts from the peak of the process that started this one
+        peak = next((line for line in status.read_text().splitlines() if line.startswith("VmHWM")), "")
+        return float(peak.split()[1]) / 2**10 if peak else float("nan")
+    if sys.platform != "darwin":
+        return float("nan")
     import resource
 
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak / (2**20 if sys.platform == "darwin" else 2**10)
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
 
 
 def _draw(rows: Rows) -> Figure:

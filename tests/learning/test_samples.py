@@ -63,6 +63,7 @@ def test_arrays_become_tensors_of_the_types_that_networks_take(tmp_path):
 def test_a_mesh_that_was_prepared_without_a_basis_has_one_of_size_0(tmp_path):
     given = network_input(prepare_mesh(blob(2), Recipe(HKS(k=20, n_times=5), 0), Store(tmp_path)))
     assert (given.surface.basis.evals.shape, given.surface.basis.evecs.shape) == ((0,), (162, 0))
+    assert given.surface.basis.mass.sum().item() == pytest.approx(1.0, abs=1e-5)
 
 
 def test_an_input_moves_to_a_device_whole(tmp_path):

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -76,6 +78,15 @@ def test_a_cost_is_measured_in_a_process_of_its_own(context):
     assert min(*found["train"], *found["test"]) > 0
     assert found["classifier"] == 257 * 162
     assert 0 < found["share"] < 1.5
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux hands a peak on")
+def test_the_memory_of_the_process_that_measures_does_not_hide_that_of_the_network(context):
+    hparams = hparams_of("mlp")
+    large = np.ones(2**28, dtype=np.uint8)  # a process of its own is told this peak as its own
+    found = cost_of(hparams, blob(4), context.store, threads=1, repeats=1)
+    assert len(large) == 2**28
+    assert found["megabytes"] > 2
 
 
 def test_a_network_is_given_the_eigenpairs_that_it_wants():
