@@ -12,7 +12,7 @@ from omegaconf import DictConfig, open_dict
 
 from csm.commands.app import command
 from csm.commands.groups import make_protocol, plain
-from csm.commands.train import make_training
+from csm.commands.train import make_training, require_network_of_recipe
 from csm.errors import ConfigError
 from csm.evaluation.report import ResultRow, add_rows
 from csm.evaluation.tables import markdown_table
@@ -65,7 +65,9 @@ def rows_of(cfg: DictConfig) -> list[Row]:
 
 
 def _row(cfg: DictConfig, name: str, seed: int) -> Row:
-    train = compose("train", overrides=[*map(str, cfg.rows[name]), *map(str, cfg.overrides)])
+    overrides = [*map(str, cfg.rows[name]), *map(str, cfg.overrides)]
+    train = compose("train", overrides=overrides)
+    require_network_of_recipe(train, overrides)
     with open_dict(train):
         train.update(name=name, seed=seed, store=cfg.store, workers=cfg.workers)
     return Row(name, seed, partial(make_training, train), identity_of(train))

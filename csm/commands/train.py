@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
+from hydra import compose
+from hydra.core.hydra_config import HydraConfig
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
 from csm.commands.app import command, output_folder
 from csm.commands.groups import make_data, make_protocol, plain, register
+from csm.errors import ConfigError
 from csm.evaluation.tables import markdown_table
 from csm.experiments.report import write_results
 from csm.experiments.testing import Tested, measure_all, numbers
 from csm.experiments.training import Training, fit
+from csm.matching.base import require_device
 from csm.matching.network import NetworkMethod
+from csm.matching.registry import matchers
 
 register("data", "descriptor", "model")
 
@@ -24,7 +30,10 @@ GROUPS = ("seed", "data", "descriptor", "model", "optimizer", "learning", "train
 def run(cfg: DictConfig) -> dict[str, Any]:
     """Train and, unless ``test=false``, test; return the numbers of the job."""
     folder = output_folder()
-    training = make_training(cfg)
+    require_network_of_recipe(cfg, HydraConfig.get().overrides.task)
+    training, protocol = make_training(cfg), make_protocol(cfg)
+    matchers(plain(cfg.matching))  # what the test wants is checked before the training
+    require_device(cfg.device)
     trained = fit(training, folder, cfg.resume)
     print(f"trained for {trained.seconds / 60:.1f} minutes: {trained.checkpoint}")
     found = {"seconds": trained.seconds, "checkpoint": str(trained.checkpoint), **trained.measured}
@@ -32,7 +41,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
         return found
     method = NetworkMethod(trained.module)
     tested = measure_all(
-        method, training.data, make_protocol(cfg), matching=plain(cfg.matching), table=cfg.table, device=cfg.device
+        method, training.data, protocol, matching=plain(cfg.matching), table=cfg.table, device=cfg.device
     )
     conclude(cfg, tested, f"{cfg.name}: {method.training['protocol']}.")
     if training.logger is not None:
@@ -55,6 +64,31 @@ def make_training(cfg: DictConfig) -> Training:
         logger=instantiate(logger, _partial_=True) if logger else None,
         settings={name: settings[name] for name in GROUPS},
     )
+
+
+def require_network_of_recipe(cfg: DictConfig, overrides: Sequence[str]) -> None:
+    """Refuse an experiment that puts another network in the place of the one that a recipe is for.
+
+    Parameters
+    ----------
+    cfg
+        What the overrides made.
+    overrides
+        As on the command line, such as ``recipe=acscnn``.
+    """
+    chosen = {group: value for group, _, value in (text.partition("=") for text in overrides)}
+    recipe, experiment = chosen.get("recipe", "null"), chosen.get("experiment", "null")
+    if "null" in (recipe, experiment):
+        return
+    wanted = compose(
+        "train", [f"{group}={chosen[group]}" for group in ("recipe", "model") if group in chosen]
+    ).model.name
+    if cfg.model.name != wanted:
+        raise ConfigError(
+            f"recipe={recipe} trains {wanted}, but experiment={experiment} chooses {cfg.model.name}, which would be "
+            "trained at the rate of the recipe; take one of the two, or an experiment that leaves the network open, "
+            "such as faust_rival or humans_rival"
+        )
 
 
 def conclude(cfg: DictConfig, tested: list[Tested], notes: str) -> None:

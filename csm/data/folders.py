@@ -131,12 +131,17 @@ class FolderSet:
     @property
     def mapped(self) -> tuple[str, ...]:
         """Names of the shapes whose correspondence is known, in natural order."""
-        return tuple(entry.name for entry in self.entries if entry.truth is not None)
+        return tuple(self.templates)
+
+    @property
+    def templates(self) -> dict[str, str]:
+        """Name -> template of the shapes whose correspondence is known."""
+        return {entry.name: entry.template for entry in self.entries if entry.truth is not None}
 
     @property
     def mapped_pairs(self) -> tuple[tuple[str, str], ...]:
         """Those of `pairs` whose two shapes have maps from one template: the pairs that can be evaluated."""
-        known = {entry.name: entry.template for entry in self.entries if entry.truth is not None}
+        known = self.templates
         return tuple((a, b) for a, b in self.pairs if a in known and b in known and known[a] == known[b])
 
     @property

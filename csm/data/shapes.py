@@ -59,6 +59,18 @@ class ShapeSet(Protocol):
         ...
 
 
+def templates_of(shapes: ShapeSet) -> dict[str, str]:
+    """Return name -> template of the shapes with known correspondence; a set that has no `templates` has one for all.
+
+    Examples
+    --------
+    >>> templates_of(InMemory([]))
+    {}
+    """
+    found: Mapping[str, str] = getattr(shapes, "templates", dict.fromkeys(shapes.names, ""))
+    return dict(found)
+
+
 class InMemory:
     """A set of shapes that are in memory already.
 

@@ -18,7 +18,7 @@ from typing import Protocol, TypeVar
 
 from csm._parallel import n_processes, parallel_map
 from csm.data.prepare import Job, prepare
-from csm.data.shapes import InMemory, Shape, ShapeSet
+from csm.data.shapes import InMemory, Shape, ShapeSet, templates_of
 from csm.data.store import Store
 from csm.descriptors.base import Descriptor
 from csm.errors import ConfigError, DataError
@@ -61,7 +61,8 @@ def evaluate(
     matching
         One or several matchers or their names.
     names
-        Of the shapes to evaluate; by default all of the set.
+        Of the shapes to evaluate; by default all of the set whose correspondence is known.  Of a set with several
+        templates, such as TOSCA with its classes, only shapes of one template make a pair.
     perturbations
         Title -> how targets are changed before they are matched, None for not at all; see the module.
     store, results
@@ -86,7 +87,8 @@ def evaluate(
         If a method, matcher or device is unknown, or two have one name.
     """
     plan = _plan(method, shapes, protocol, matching, perturbations, store, results, device, skip_failures)
-    pairs = plan.protocol.choose(list(plan.shapes.names if names is None else names))
+    templates = templates_of(plan.shapes)
+    pairs = plan.protocol.choose(list(templates if names is None else names), templates)
     return _run(plan, pairs, workers, keep_pairs, progress)
 
 
@@ -181,7 +183,7 @@ def _prepare(plan: Plan, pairs: Sequence[Pair], workers: int | None, progress: b
 def _measure_targets(
     plan: Plan, pairs: Sequence[Pair], workers: int | None, progress: bool
 ) -> dict[Cell, tuple[dict[Pair, PairErrors], dict[str, str]]]:
-    """Return for every cell its measured pairs, and which targets failed and why."""
+    """Return for every cell its measured pairs, and which targets or pairs failed and why."""
     sources: dict[str, list[str]] = {}
     for source, target in pairs:
         sources.setdefault(target, []).append(source)
@@ -200,7 +202,7 @@ def _measure_targets(
     return {
         cell: (
             {one.pair: one for found in done for one in found.pairs.get(cell, ())},
-            {name: found.failed[cell] for name, found in zip(sources, done, strict=True) if cell in found.failed},
+            {what: why for found in done for what, why in found.failed.get(cell, {}).items()},
         )
         for cell in plan.cells
     }

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
@@ -42,6 +43,17 @@ class MeasuredPoints:
 
     template: IntArray
     exact: BoolArray
+
+
+def _name_pairs(pairs: Iterable[Sequence[str]]) -> tuple[Pair, ...]:
+    """Return pairs of names as tuples; ConfigError if something else is among them."""
+    try:
+        given = list(pairs)
+        if any(isinstance(pair, str) for pair in given):
+            raise TypeError("a name alone is no pair")
+        return tuple((source, target) for source, target in given)
+    except (TypeError, ValueError) as error:
+        raise ConfigError(f'protocol: pairs={pairs!r}; wanted "all" or a list of name pairs ({error})') from error
 
 
 @dataclass(frozen=True)
@@ -90,9 +102,13 @@ class EvaluationProtocol:
                 raise ConfigError(f"protocol: {what}={value!r} is unknown; choose one of {', '.join(known)}")
         if isinstance(self.pairs, str) and self.pairs != "all":
             raise ConfigError(f'protocol: pairs={self.pairs!r} is unknown; wanted "all" or a list of name pairs')
+        if not isinstance(self.pairs, str):
+            object.__setattr__(self, "pairs", _name_pairs(self.pairs))
         for what, count in (("sample", self.sample), ("points", self.points), ("exact_points", self.exact_points)):
-            if count is not None and count < 1:
-                raise ConfigError(f"protocol: {what}={count}; wanted a number from 1, or none for all")
+            if count is not None and not (isinstance(count, Integral) and count >= 1):
+                raise ConfigError(f"protocol: {what}={count!r}; wanted a whole number from 1, or none for all")
+        if not (isinstance(self.seed, Integral) and self.seed >= 0):
+            raise ConfigError(f"protocol: seed={self.seed!r}; wanted a whole number from 0")
         if self.exact_points is not None and self.distance != "exact":
             raise ConfigError(f"protocol: exact_points={self.exact_points} goes with distance=exact only")
         if self.exact_points is not None and self.points is not None and self.drawn == "pair":
@@ -101,21 +117,52 @@ class EvaluationProtocol:
                 "to be as well: drawn=template"
             )
 
-    def choose(self, names: Sequence[str]) -> list[Pair]:
+    def choose(self, names: Sequence[str], templates: Mapping[str, str] | None = None) -> list[Pair]:
         """Return the (source, target) pairs to evaluate among shapes of these names.
+
+        Parameters
+        ----------
+        names
+            Of the shapes.
+        templates
+            Name -> template: only shapes of one template can be compared.  None where all have the same.
+
+        Raises
+        ------
+        DataError
+            If a name is given twice, a pair names another shape or shapes of two templates, or there is no pair.
 
         Examples
         --------
         >>> EvaluationProtocol().choose(["a", "b"])
         [('a', 'b'), ('b', 'a')]
         """
+        if len(set(names)) != len(names):
+            twice = next(name for name in names if list(names).count(name) > 1)
+            raise DataError(
+                f"{len(names)} shapes have only {len(set(names))} different names; {twice!r} is there twice"
+            )
+        template = dict.fromkeys(names, "") if templates is None else templates
+        unmapped = [name for name in names if name not in template]
+        if unmapped:
+            raise DataError(f"{unmapped[0]!r} and {len(unmapped) - 1} more of the shapes have no known correspondence")
         if isinstance(self.pairs, str):
-            pairs = list(itertools.permutations(names, 2))
+            pairs = [(a, b) for a, b in itertools.permutations(names, 2) if template[a] == template[b]]
         else:
-            pairs = [(source, target) for source, target in self.pairs]
+            pairs = list(self.pairs)
         unknown = sorted({name for pair in pairs for name in pair} - set(names))
         if unknown:
-            raise DataError(f"the pair list names {unknown[0]!r} and {len(unknown) - 1} more that are not in the set")
+            raise DataError(
+                f"the pair list names {unknown[0]!r} and {len(unknown) - 1} more that are not among the "
+                f"{len(names)} shapes that can be evaluated"
+            )
+        across = [(a, b) for a, b in pairs if template[a] != template[b]]
+        if across:
+            source, target = across[0]
+            raise DataError(
+                f"the pair list has {source} -> {target} and {len(across) - 1} more whose maps start from different "
+                "templates, so that nothing tells which vertices correspond; leave them out"
+            )
         if not pairs:
             raise DataError(f"there is no pair to evaluate: {len(names)} shapes, pairs={self.pairs!r}")
         if self.sample is not None and self.sample < len(pairs):

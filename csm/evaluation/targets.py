@@ -78,16 +78,16 @@ class Matches(NamedTuple):
     """The matched points of one target, which are to be measured.
 
     `points` has an entry per source for every cell; `left` has for every perturbation the fraction of vertices that it
-    leaves; `keys` are the cache keys of the cells; `kept` are the stored results of earlier runs; `failed` says why a
-    cell cannot be measured.
+    leaves; `keys` are the cache keys of the cells; `kept` are the stored results of earlier runs; `failed` says for a
+    cell what cannot be measured, the target or a pair, and why.
     """
 
     mesh: Mesh
-    points: dict[Cell, list[MatchedPoints]]
+    points: dict[Cell, dict[str, MatchedPoints]]
     left: dict[str, float]
     keys: dict[Cell, dict[str, Any]]
     kept: dict[Cell, list[PairErrors]]
-    failed: dict[Cell, str]
+    failed: dict[Cell, dict[str, str]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,10 +106,10 @@ class TargetTask:
 
 
 class Found(NamedTuple):
-    """What came out of one target: for every cell its pairs, or why there are none."""
+    """What came out of one target: for every cell its pairs, and what is not there, the target or a pair, and why."""
 
     pairs: dict[Cell, list[PairErrors]]
-    failed: dict[Cell, str]
+    failed: dict[Cell, dict[str, str]]
 
 
 def matched_tasks(tasks: Iterator[TargetTask], memory: Memory) -> Iterator[TargetTask]:
@@ -130,22 +130,45 @@ def match_target(task: TargetTask, memory: Memory) -> Matches:
         try:
             changed = None if change is None else change(target.mesh)
         except CsmError as error:
-            matches.failed.update(dict.fromkeys(cells, str(error)))
+            matches.failed.update({cell: {task.target: str(error)} for cell in cells})
             continue
         matches.left[title] = 1.0 if changed is None else len(changed.kept) / target.mesh.n_vertices
         there = cache(partial(_target, task, changed, memory))
         for cell in cells:
-            if _is_kept(task, cell, maps, changed, matches):
-                continue
-            try:
-                points = [_points(task, cell, source, there(cell.method), changed, memory) for source in task.sources]
-            except CsmError as error:
-                if change is None and not plan.skip_failures:
-                    raise
-                matches.failed[cell] = str(error)
-            else:
-                matches.points[cell] = points
+            if not _is_kept(task, cell, maps, changed, matches):
+                _match_cell(task, cell, there, changed, memory, matches)
     return matches
+
+
+def _match_cell(
+    task: TargetTask,
+    cell: Cell,
+    there: Callable[[str], Described],
+    changed: Damaged | None,
+    memory: Memory,
+    matches: Matches,
+) -> None:
+    """Match every source in one cell; note what fails, unless that is an error of the evaluation."""
+    try:
+        target = there(cell.method)
+    except CsmError as error:
+        if changed is None and not task.plan.skip_failures:
+            raise
+        matches.failed[cell] = {task.target: str(error)}
+        return
+    found, failed = {}, {}
+    for source in task.sources:
+        try:
+            found[source] = _points(task, cell, source, target, changed, memory)
+        except CsmError as error:
+            if changed is None and not task.plan.skip_failures:
+                raise
+            failed[f"{source} -> {task.target}"] = str(error)
+    if found:
+        matches.points[cell] = found
+    if failed:
+        alike = not found and len(set(failed.values())) == 1
+        matches.failed[cell] = {task.target: next(iter(failed.values()))} if alike else failed
 
 
 def _target(task: TargetTask, changed: Damaged | None, memory: Memory, method: str) -> Described:
@@ -205,23 +228,23 @@ def measure_target(task: TargetTask) -> Found:
         except CsmError as error:
             if not plan.skip_failures:
                 raise
-            failed |= dict.fromkeys(matches.points, str(error))
+            failed |= {cell: {task.target: str(error)} for cell in matches.points}
     return Found(matches.kept | measured, failed)
 
 
 def _errors(task: TargetTask, matches: Matches) -> dict[Cell, list[PairErrors]]:
     """Measure the points of all cells together, because most are the same, and store the results."""
-    plan, together = task.plan, [points for of_cell in matches.points.values() for points in of_cell]
+    plan, together = task.plan, [points for of_cell in matches.points.values() for points in of_cell.values()]
     memo = plan.store if plan.protocol.distance == "exact" else None
     measured = target_errors(matches.mesh, together, plan.protocol.distance, plan.protocol.normaliser, memo)
     errors = iter(measured.errors)
     found = {}
     for cell, of_cell in matches.points.items():
         pairs = [
-            PairErrors(pair, points, next(errors), measured.lengths, matches.left.get(cell.perturbation, 1.0))
-            for pair, points in zip(task.pairs, of_cell, strict=True)
+            PairErrors((source, task.target), points, next(errors), measured.lengths, matches.left[cell.perturbation])
+            for source, points in of_cell.items()
         ]
-        if plan.results is not None:
+        if plan.results is not None and len(pairs) == len(task.sources):
             kept = plan.results.fetch("matched", matches.mesh, matches.keys[cell], partial(to_arrays, pairs))
             pairs = from_arrays(kept, task.pairs)
         found[cell] = pairs

@@ -21,7 +21,9 @@ from csm.evaluation.protocol import EvaluationProtocol
 from csm.evaluation.report import ResultRow, average_seeds, read_rows, write_curves_csv, write_rows
 from csm.experiments.testing import measure_set
 from csm.experiments.training import Training, fit, last_checkpoint
+from csm.matching.base import require_device
 from csm.matching.network import NetworkMethod, load_model
+from csm.matching.registry import matchers
 from csm.mesh.io import atomic_path
 
 _log = logging.getLogger(__name__)
@@ -83,8 +85,11 @@ class Matrix:
         Raises
         ------
         ConfigError
-            After all other rows are done, if some failed; or if nothing is trained and nothing may be.
+            Before anything is trained, if a matcher or the device is unknown; after all other rows are done, if some
+            failed; or if nothing is trained and nothing may be.
         """
+        matchers(self.matching)
+        require_device(self.device)
         found: list[ResultRow] = []
         failures: list[str] = []
         for row in rows:

@@ -90,7 +90,7 @@ def require_device(device: str) -> str:
     'cpu'
     """
     try:
-        torch.empty(0, device=device)
+        torch.zeros(1, device=device).item()  # a device without numbers, such as "meta", is of no use
     except (RuntimeError, AssertionError, NotImplementedError) as error:
         why = str(error).splitlines()[0]
         raise ConfigError(f"device={device}: PyTorch cannot use it here ({why}); device=cpu always works") from error

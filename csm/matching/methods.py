@@ -15,6 +15,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from csm._types import FloatArray
 from csm.data.prepare import Recipe, features_of
 from csm.data.store import Store
 from csm.descriptors.base import Descriptor, record
@@ -101,7 +102,7 @@ class PrecomputedMethod(Method):
         What tables call them.
     """
 
-    features: Mapping[str, Tensor]
+    features: Mapping[str, Tensor | FloatArray]
     name: str = "precomputed"
 
     @cached_property
@@ -109,8 +110,9 @@ class PrecomputedMethod(Method):
         """The hash of all features."""
         digest = hashlib.sha256()
         for name, tensor in sorted(self.features.items()):
-            digest.update(f"{name},{tuple(tensor.shape)},{tensor.dtype};".encode())
-            digest.update(tensor.detach().cpu().numpy().tobytes())
+            plain = torch.as_tensor(tensor).detach().cpu().contiguous()
+            digest.update(f"{name},{tuple(plain.shape)},{plain.dtype};".encode())
+            digest.update(plain.view(torch.uint8).numpy().tobytes())
         return {"precomputed": digest.hexdigest()}
 
     @property
@@ -128,7 +130,7 @@ class PrecomputedMethod(Method):
                 f"{self.name}: {mesh.name} has {mesh.n_vertices} vertices, its features {len(found)} rows; wanted one "
                 "row per vertex"
             )
-        return Described(mesh, found.to(device), store=store)
+        return Described(mesh, torch.as_tensor(found).to(device), store=store)
 
 
 def as_method(method: Method | Descriptor | str) -> Method:

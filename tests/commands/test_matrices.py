@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import pytest
 from hydra import compose, initialize_config_dir
+from omegaconf import OmegaConf
 
 from csm.commands.app import config_folder
 from csm.commands.matrix import rows_of
+from csm.errors import ConfigError
 from csm.reproduction.learned import varied
 from csm.reproduction.published import LEARNED_AGE, row_title
 from csm.reproduction.registry import STUDIES
@@ -44,6 +46,15 @@ def test_studies_that_share_a_folder_mean_the_same_by_a_row_of_one_name():
 def test_the_figures_compare_what_their_captions_say():
     assert [row_title(row) for row in names_of("figure9")] == ["CSMCNN", "ACD + MGCN", "ACD + DiffusionNet"]
     assert [row_title(row) for row in names_of("figure11")] == ["ACD alone", "ACD + MLP", "CSMCNN"]
+
+
+def test_an_experiment_does_not_change_the_network_of_a_recipe_in_silence():
+    with initialize_config_dir(str(config_folder()), version_base="1.3"):
+        rows = '{fine: ["recipe=mlp", "experiment=humans_rival"], bad: ["recipe=mlp", "experiment=humans"]}'
+        cfg = compose("matrix", [f"+rows={rows}"])
+        assert rows_of(OmegaConf.merge(cfg, {"only": ["fine"]}))[0].identity["model.name"] == "mlp"
+        with pytest.raises(ConfigError, match="recipe=mlp trains mlp, but experiment=humans chooses csmcnn"):
+            rows_of(OmegaConf.merge(cfg, {"only": ["bad"]}))
 
 
 def test_an_ablation_varies_one_option_at_a_time():

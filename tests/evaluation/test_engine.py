@@ -17,7 +17,7 @@ from csm.data.shapes import InMemory, Shape
 from csm.data.store import Store
 from csm.descriptors import HKS, Coordinates
 from csm.errors import ConfigError, DataError
-from csm.evaluation import evaluate
+from csm.evaluation import engine, evaluate
 from csm.evaluation.protocol import EvaluationProtocol
 from csm.matching.methods import DescriptorMethod, PrecomputedMethod
 from csm.matching.nearest import Nearest
@@ -239,7 +239,8 @@ def test_workers_change_nothing(tmp_path) -> None:
             assert one.rows == two.rows
 
 
-def test_features_end_up_on_the_device_that_is_asked_for(tmp_path) -> None:
+def test_features_end_up_on_the_device_that_is_asked_for(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(engine, "require_device", str)  # it refuses "meta", which is the second device of every machine
     seen = []
 
     class Watching(Fixed):
@@ -281,3 +282,19 @@ def test_near_misses_on_bodies_take_seconds(data_set: Callable[[str], Path]) -> 
         assert row.age * row.diameter <= edges.mean() + 1e-12
         assert row.age * row.diameter >= 0.98 * edges.mean()
         assert 1.4 < row.diameter / row.sqrt_area < 1.7
+
+
+def test_a_pair_that_cannot_be_used_leaves_the_others_alone() -> None:
+    items = shapes()
+    features = PrecomputedMethod({s.name: torch.from_numpy(s.mesh.vertices.copy()) for s in items[:2]})
+    (found,) = here(features, items, EvaluationProtocol(distance="edge"), skip_failures=True)
+    assert [(row.source, row.target) for row in found.rows] == [("s0", "s1"), ("s1", "s0")]
+    assert sorted(found.failures) == ["s2", "s2 -> s0", "s2 -> s1"]
+
+
+def test_pairs_of_a_set_are_those_within_its_templates() -> None:
+    class Classes(InMemory):
+        templates = {"s0": "cat", "s1": "cat", "s2": "dog"}  # noqa: RUF012
+
+    (found,) = here(PLACES, Classes(shapes(4)), EvaluationProtocol(distance="edge"))
+    assert [(row.source, row.target) for row in found.rows] == [("s0", "s1"), ("s1", "s0")]

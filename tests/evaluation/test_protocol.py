@@ -33,7 +33,7 @@ def test_pairs_are_all_or_listed_or_drawn() -> None:
 
 
 def test_pairs_that_there_are_not_are_named() -> None:
-    with pytest.raises(DataError, match="names 'y' and 1 more that are not in the set"):
+    with pytest.raises(DataError, match="names 'y' and 1 more that are not among the 1 shapes"):
         EvaluationProtocol(pairs=[("a", "y"), ("z", "a")]).choose(["a"])
     with pytest.raises(DataError, match="no pair to evaluate: 1 shapes"):
         EvaluationProtocol().choose(["a"])
@@ -125,8 +125,15 @@ def test_the_words_are_those_of_results_that_are_there() -> None:
         {"normaliser": "volume"},
         {"drawn": "shape"},
         {"pairs": "some"},
+        {"pairs": None},
+        {"pairs": ["ab", "cd"]},
+        {"pairs": [("a", "b", "c")]},
         {"sample": 0},
         {"points": 0},
+        {"points": 2.5},
+        {"points": "3"},
+        {"seed": None},
+        {"seed": -1},
         {"exact_points": 0},
         {"exact_points": 5, "distance": "edge"},
         {"exact_points": 5, "points": 9, "drawn": "pair"},
@@ -137,6 +144,25 @@ def test_protocols_that_cannot_work(bad: dict[str, object]) -> None:
         EvaluationProtocol(**bad)  # type: ignore[arg-type]
 
 
+def test_pairs_may_come_from_a_generator() -> None:
+    protocol = EvaluationProtocol(pairs=((a, b) for a, b in ["ab", "ba"]))
+    assert protocol.choose(["a", "b"]) == protocol.choose(["a", "b"]) == [("a", "b"), ("b", "a")]
+
+
 def test_a_protocol_survives_pickling() -> None:
     protocol = EvaluationProtocol(pairs=[("a", "b")], points=3, exact_points=2)
     assert pickle.loads(pickle.dumps(protocol)) == protocol
+
+
+def test_only_shapes_of_one_template_make_a_pair() -> None:
+    templates = {"s0": "cat", "s1": "cat", "s2": "dog"}
+    assert EvaluationProtocol().choose(list(templates), templates) == [("s0", "s1"), ("s1", "s0")]
+    with pytest.raises(DataError, match=r"s0 -> s2 and 0 more whose maps start from different templates"):
+        EvaluationProtocol(pairs=[("s0", "s2")]).choose(list(templates), templates)
+    with pytest.raises(DataError, match="'s3' and 0 more of the shapes have no known correspondence"):
+        EvaluationProtocol().choose(["s0", "s1", "s3"], templates)
+
+
+def test_a_name_that_is_given_twice_is_refused() -> None:
+    with pytest.raises(DataError, match="3 shapes have only 2 different names; 's1' is there twice"):
+        EvaluationProtocol().choose(["s0", "s1", "s1"])

@@ -139,6 +139,13 @@ def test_rows_that_fail_are_listed_when_the_others_are_done(bench):
     assert [r.method for r in read_rows(bench.folder / "cells/matrix.json")] == ["good"]
 
 
+@pytest.mark.parametrize("unknown", [{"matching": ("nope",)}, {"device": "nope"}])
+def test_what_a_test_wants_is_checked_before_the_training(bench, unknown):
+    with pytest.raises(ConfigError, match="nope"):
+        bench.fill([bench.row()], **unknown)
+    assert bench.trained == []
+
+
 def test_without_a_network_and_a_training_there_is_no_table(bench, caplog):
     with pytest.raises(ConfigError, match=r"no network of these rows and seeds is trained, and train=false"):
         bench.fill([bench.row()], train=False)

@@ -81,3 +81,18 @@ def test_methods_survive_pickling():
     assert (again.name, again.key) == ("mine", record(CHEAP))
     features = PrecomputedMethod({"a": torch.ones(3, 2)})
     assert pickle.loads(pickle.dumps(features)).key == features.key
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+def test_features_may_be_arrays(kind, tmp_path):
+    array = np.arange(324, dtype=kind).reshape(162, 2)
+    method = PrecomputedMethod({"m": array})
+    assert method.key == PrecomputedMethod({"m": torch.from_numpy(array)}).key
+    mesh = Mesh(blob(2).vertices, blob(2).faces, "m")
+    np.testing.assert_array_equal(method.describe(mesh, Store(tmp_path)).features, array)
+
+
+def test_features_of_half_precision_have_a_key():
+    halves = [torch.arange(6, dtype=torch.bfloat16).reshape(3, 2) + i for i in range(2)]
+    first, second = (PrecomputedMethod({"a": half}).key for half in halves)
+    assert first != second
