@@ -123,7 +123,7 @@ class Described:
         """What the classifier says; ConfigError if there is none."""
         if self.classifier is None:
             raise ConfigError(
-                f"{self.mesh.name}: matching through the classifier needs a trained network with its classifier; a "
+                f"{self.mesh.label}: matching through the classifier needs a trained network with its classifier; a "
                 "descriptor has none, and an export leaves it out: use the .ckpt file"
             )
         return votes(self.features, self.classifier)

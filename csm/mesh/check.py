@@ -79,7 +79,7 @@ def require_usable(mesh: Mesh) -> None:
     errors = [finding.text for finding in check(mesh) if finding.severity == "error"]
     if errors:
         raise MeshError(
-            f"{mesh.name}: {'; '.join(errors)}. Spectral operators need this mended; csm does not change meshes, "
+            f"{mesh.label}: {'; '.join(errors)}. Spectral operators need this mended; csm does not change meshes, "
             "because vertex numbers are the ground truth"
         )
 

@@ -61,7 +61,7 @@ def without_part(mesh: Mesh, centre: int, fraction: float) -> Damaged:
     cut = order[np.cumsum(mesh.face_areas[order]) <= fraction * mesh.area]
     faces = np.delete(mesh.faces, cut, axis=0)
     if len(faces) == 0:
-        raise MeshError(f"{mesh.name}: cutting {fraction:g} of the area away leaves nothing")
+        raise MeshError(f"{mesh.label}: cutting {fraction:g} of the area away leaves nothing")
     return _largest_component(mesh, faces)
 
 
@@ -117,7 +117,7 @@ def _nearest_of_far(mesh: Mesh, graph: csr_array, sample: IntArray, far: float) 
     gaps = cdist(mesh.vertices[sample], mesh.vertices)
     gaps[~((way >= far) & np.isfinite(way))] = np.inf
     if np.isinf(gaps).all():
-        raise MeshError(f"{mesh.name}: no two points are {far:g} apart along the surface; ask for less")
+        raise MeshError(f"{mesh.label}: no two points are {far:g} apart along the surface; ask for less")
     i, end = np.unravel_index(gaps.argmin(), gaps.shape)
     return int(sample[i]), int(end)
 

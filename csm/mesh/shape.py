@@ -26,6 +26,10 @@ class Mesh:
         What messages, progress bars and result files call this shape.
     scale
         Length of one unit of `vertices` in the unit of the file the mesh was read from; 1 until `unit_area` is called.
+    source
+        The file it was read from, as it was given; empty for a mesh made in memory.
+    notes
+        What the reader noticed in the file, one sentence each.
 
     Raises
     ------
@@ -37,20 +41,27 @@ class Mesh:
     faces: IntArray
     name: str = "mesh"
     scale: float = 1.0
+    source: str = ""
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         vertices = np.array(self.vertices, dtype=np.float64, order="C")
         faces = np.array(self.faces, dtype=np.int64, order="C")
         if vertices.ndim != 2 or vertices.shape[1] != 3:
-            raise MeshError(f"{self.name}: vertices have shape {vertices.shape}, wanted (N, 3)")
+            raise MeshError(f"{self.label}: vertices have shape {vertices.shape}, wanted (N, 3)")
         if faces.ndim != 2 or faces.shape[1] != 3:
             raise MeshError(
-                f"{self.name}: faces have shape {faces.shape}, wanted (M, 3): csm reads triangle meshes only"
+                f"{self.label}: faces have shape {faces.shape}, wanted (M, 3): csm reads triangle meshes only"
             )
-        _require_indices_in_range(faces, len(vertices), self.name)
+        _require_indices_in_range(faces, len(vertices), self.label)
         for key, array in (("vertices", vertices), ("faces", faces)):
             array.setflags(write=False)
             object.__setattr__(self, key, array)
+
+    @property
+    def label(self) -> str:
+        """What messages call this shape: the file as it was given, else the name."""
+        return self.source or self.name
 
     @property
     def n_vertices(self) -> int:
@@ -106,7 +117,7 @@ class Mesh:
         """Return the same shape scaled about the origin to a total area of 1; `scale` keeps the way back."""
         area = self.area
         if not (np.isfinite(area) and area > 0):
-            raise MeshError(f"{self.name}: the surface area is {area}, so it cannot be scaled to 1; run `csm check`")
+            raise MeshError(f"{self.label}: the surface area is {area}, so it cannot be scaled to 1; run `csm check`")
         length = float(np.sqrt(area))
         return replace(self, vertices=self.vertices / length, scale=self.scale * length)
 

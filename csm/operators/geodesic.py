@@ -89,7 +89,7 @@ class _OnMesh:
 
     def __init__(self, mesh: Mesh) -> None:
         if mesh.n_faces == 0:
-            raise MeshError(f"{mesh.name}: geodesic distances need faces, but the mesh has none")
+            raise MeshError(f"{mesh.label}: geodesic distances need faces, but the mesh has none")
         self.mesh = mesh
         self.used, faces = np.unique(mesh.faces, return_inverse=True)
         self.vertices = mesh.vertices[self.used]
@@ -114,7 +114,7 @@ class _OnMesh:
     def pairs(self, sources: IntArray, targets: IntArray) -> FloatArray:
         sources, targets = self._checked(sources), self._checked(targets)
         if sources.shape != targets.shape:
-            raise ConfigError(f"{self.mesh.name}: {len(sources)} sources but {len(targets)} targets: they go in pairs")
+            raise ConfigError(f"{self.mesh.label}: {len(sources)} sources but {len(targets)} targets: they go in pairs")
         out = np.where(sources == targets, 0.0, np.inf)
         joined = self._joined(sources, targets)
         plan = plan_pairs(self.vertices, self.local[sources[joined]], self.local[targets[joined]], self.symmetric)
@@ -148,7 +148,7 @@ class _OnMesh:
         outside = index[(index < 0) | (index >= self.mesh.n_vertices)]
         if outside.size:
             raise ConfigError(
-                f"{self.mesh.name}: vertex {outside[0]} was asked for, but there are {self.mesh.n_vertices}"
+                f"{self.mesh.label}: vertex {outside[0]} was asked for, but there are {self.mesh.n_vertices}"
             )
         return index
 
@@ -221,6 +221,6 @@ def _require_window_propagation(mesh: Mesh) -> None:
         problems.append(f"edges of no length ({int(no_length.sum())})")
     if problems:
         raise MeshError(
-            f"{mesh.name}: exact geodesics need a manifold, but there are {'; '.join(problems)}; mend the mesh, or "
+            f"{mesh.label}: exact geodesics need a manifold, but there are {'; '.join(problems)}; mend the mesh, or "
             "choose the distance heat or edge"
         )

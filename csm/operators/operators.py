@@ -119,12 +119,12 @@ class Operators:
         return self._spectrum("albo", params, solve)
 
     def _solve(self, matrix: sparse.csr_array, k: int) -> Spectrum:
-        spectrum = eigenpairs(matrix, self.mass, k, name=self.mesh.name)
+        spectrum = eigenpairs(matrix, self.mass, k, name=self.mesh.label)
         flat = degenerate_faces(self.mesh)
         if flat.size == 0:
             return spectrum
         note = f"{flat.size} faces have (almost) no area, the first is face {flat[0]}; the Laplacian floors their area"
-        _log.warning("%s: %s", self.mesh.name, note)
+        _log.warning("%s: %s", self.mesh.label, note)
         return replace(spectrum, notes=(*spectrum.notes, note))
 
     def _spectrum(self, kind: str, params: dict[str, Any], solve: Callable[[], Spectrum]) -> Spectrum:

@@ -98,11 +98,11 @@ def as_colors(colors: ArrayLike | None, n: int) -> FloatArray:
 
 def _require_drawable(mesh: Mesh, size: tuple[int, int], supersample: int, background: str) -> None:
     if mesh.n_faces == 0:
-        raise MeshError(f"{mesh.name}: there are no faces to draw")
+        raise MeshError(f"{mesh.label}: there are no faces to draw")
     finite = np.isfinite(mesh.vertices).all(axis=1)
     if not finite.all():
         bad = int(np.argmin(finite))
-        raise MeshError(f"{mesh.name}: vertex {bad} is not finite, so the shape cannot be drawn; run `csm check`")
+        raise MeshError(f"{mesh.label}: vertex {bad} is not finite, so the shape cannot be drawn; run `csm check`")
     if min(size) < 1 or supersample < 1:
         raise ConfigError(f"picture of {size[0]} x {size[1]} pixels with {supersample} samples: all must be 1 or more")
     if background not in ("white", "transparent"):

@@ -59,14 +59,14 @@ class Panel:
     def __post_init__(self) -> None:
         n = self.mesh.n_vertices
         if self.mesh.n_faces == 0 or not np.isfinite(self.mesh.vertices).all():
-            raise MeshError(f"{self.mesh.name}: a page can show only meshes with faces and finite coordinates")
+            raise MeshError(f"{self.mesh.label}: a page can show only meshes with faces and finite coordinates")
         for what, array, wanted in (
             ("colours", self.colors, (n, 3)),
             ("the map", self.to_reference, (n,)),
             ("errors", self.errors, (n,)),
         ):
             if array is not None and np.shape(array) != wanted:
-                raise ConfigError(f"{self.mesh.name}: {what} have shape {np.shape(array)}, wanted {wanted}")
+                raise ConfigError(f"{self.mesh.label}: {what} have shape {np.shape(array)}, wanted {wanted}")
 
     @property
     def title(self) -> str:

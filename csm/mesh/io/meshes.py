@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -80,7 +79,7 @@ def read_mesh(path: str | os.PathLike[str], name: str | None = None) -> Mesh:
     raw = _parsed(path, parse)
     if raw.faces.dtype.kind not in "iu":
         raise MeshError(f"{path}: the faces are of type {raw.faces.dtype}, wanted integers")
-    return replace(Mesh(raw.vertices, raw.faces, str(path)), name=name or path.stem)
+    return Mesh(raw.vertices, raw.faces, name or path.stem, source=str(path))
 
 
 def _parsed(path: Path, parse: Callable[[bytes], RawMesh]) -> RawMesh:

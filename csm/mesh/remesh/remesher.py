@@ -85,7 +85,7 @@ def refine(mesh: Mesh, n_vertices: int, seed: int = 0) -> Remeshed:
     _require_fit(mesh)
     if n_vertices < mesh.n_vertices:
         raise MeshError(
-            f"{mesh.name}: cannot refine {mesh.n_vertices} vertices to {n_vertices}; ask for more, or use `remesh`"
+            f"{mesh.label}: cannot refine {mesh.n_vertices} vertices to {n_vertices}; ask for more, or use `remesh`"
         )
     editable = EditableMesh(mesh, np.ones(mesh.n_vertices), mesh.n_vertices, np.random.default_rng(seed))
     while editable.n < n_vertices:
@@ -194,5 +194,5 @@ def _require_fit(mesh: Mesh) -> None:
     unfit = [f.text for f in check(mesh) if f.severity == "error" or f.kind in _UNFIT]
     if unfit:
         raise MeshError(
-            f"{mesh.name}: {'; '.join(unfit)}. Remeshing needs a manifold, oriented mesh; mend the file and try again"
+            f"{mesh.label}: {'; '.join(unfit)}. Remeshing needs a manifold, oriented mesh; mend the file and try again"
         )
