@@ -10,6 +10,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import fields
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hydra.core.config_store import ConfigStore
@@ -26,6 +27,20 @@ if TYPE_CHECKING:
 
 FILLED_IN = ("self", "train_set", "test_sets", "descriptor", "store", "workers", "stencils", "options")
 """Arguments of data modules that commands give, so that they are no options."""
+
+
+def config_folder() -> Path:
+    """Return the folder of the Hydra groups: inside the installed package, or beside it in a checkout."""
+    package = Path(__file__).resolve().parent.parent
+    inside = package / "conf"
+    return inside if inside.is_dir() else package.parent / "conf"
+
+
+def options_of(group: str) -> list[str]:
+    """Return the names that can be chosen of a group: those from a registry, and those of yaml files."""
+    made = list(GROUPS[group]()) if group in GROUPS else []
+    files = sorted(path.stem for path in (config_folder() / group).glob("*.yaml"))
+    return list(dict.fromkeys([*made, *files]))
 
 
 def register(*groups: str) -> None:

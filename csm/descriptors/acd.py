@@ -10,9 +10,8 @@ import numpy as np
 
 from csm._types import FloatArray
 from csm.descriptors.angular import ByAngle
-from csm.descriptors.base import Features, as_operators
+from csm.descriptors.base import Features
 from csm.errors import ConfigError
-from csm.mesh.shape import Mesh
 from csm.operators.frames import FrameKind
 from csm.operators.operators import Operators
 from csm.operators.spectrum import Spectrum
@@ -124,9 +123,8 @@ class ACD(ByAngle):
     def _ks(self) -> range:
         return range(self.k, self.k - self.cuts, -1)
 
-    def __call__(self, shape: Mesh | Operators) -> Features:
+    def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, one column per name, in units of 1/area unless normalised."""
-        operators = as_operators(shape)
         spectra = [self._spectrum(operators, theta) for theta in self.thetas]
         damping = np.arange(1, self.order + 2) ** -self.damping
         values = np.hstack([chebyshev_block(s.first(k), self.order) * damping for s in spectra for k in self._ks])

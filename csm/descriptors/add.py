@@ -10,10 +10,9 @@ import numpy as np
 from csm._types import FloatArray
 from csm.descriptors.acd import unit_rows
 from csm.descriptors.angular import ByAngle
-from csm.descriptors.base import Features, as_operators
+from csm.descriptors.base import Features
 from csm.descriptors.geovec import geometry_vectors
 from csm.errors import ConfigError
-from csm.mesh.shape import Mesh
 from csm.operators.frames import FrameKind
 from csm.operators.operators import Operators
 from csm.operators.spectrum import Spectrum
@@ -93,9 +92,8 @@ class ADD(ByAngle):
         """Names of the J S columns, angle by angle."""
         return tuple(f"theta={theta:.3f} spline {i}" for theta in self.thetas for i in range(1, self.n_splines + 1))
 
-    def __call__(self, shape: Mesh | Operators) -> Features:
+    def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, (N, J S), in units of 1/area unless normalised."""
-        operators = as_operators(shape)
         values = np.hstack([self._block(self._spectrum(operators, theta)) for theta in self.thetas])
         return Features(unit_rows(values) if self.normalise else values, self.columns)
 

@@ -8,10 +8,9 @@ from typing import ClassVar, Literal, TypeAlias, get_args
 import numpy as np
 
 from csm._types import FloatArray
-from csm.descriptors.base import Descriptor, Features, as_operators
+from csm.descriptors.base import Descriptor, Features
 from csm.descriptors.wks import WaveBand
 from csm.errors import ConfigError
-from csm.mesh.shape import Mesh
 from csm.operators.operators import Operators
 
 LengthUnit: TypeAlias = Literal["original", "unit_area"]
@@ -74,9 +73,8 @@ class AMKS(Descriptor):
         if self.k < 2 or self.n_energies < 2 or not self.variance > 0 or not self.time >= 0:
             raise ConfigError(f"{self}: wanted k and n_energies of at least 2, variance > 0 and time >= 0")
 
-    def __call__(self, shape: Mesh | Operators) -> Features:
+    def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, (N, n_energies), in units of 1/area^2 of the chosen unit of length."""
-        operators = as_operators(shape)
         spectrum = operators.lbo(self.k)
         # The area of one unit square of the chosen unit, measured in that of the operators.
         square = spectrum.mass.sum() if self.units == "unit_area" else operators.mesh.scale**-2

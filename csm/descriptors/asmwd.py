@@ -10,9 +10,8 @@ import numpy as np
 from csm._types import FloatArray
 from csm.descriptors.acd import unit_rows
 from csm.descriptors.angular import ByAngle
-from csm.descriptors.base import Features, as_operators
+from csm.descriptors.base import Features
 from csm.errors import ConfigError
-from csm.mesh.shape import Mesh
 from csm.operators.filters import filter_names, meyer_filters, unit_sums
 from csm.operators.frames import FrameKind
 from csm.operators.operators import Operators
@@ -85,9 +84,8 @@ class ASMWD(ByAngle):
         """Names of the J S columns, angle by angle."""
         return tuple(f"theta={theta:.3f} {name}" for theta in self.thetas for name in filter_names(self.n_filters))
 
-    def __call__(self, shape: Mesh | Operators) -> Features:
+    def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, (N, J S), in units of 1/area unless normalised."""
-        operators = as_operators(shape)
         values = np.hstack([meyer_block(self._spectrum(operators, theta), self.n_filters) for theta in self.thetas])
         return Features(unit_rows(values) if self.normalise else values, self.columns)
 

@@ -7,10 +7,9 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from csm.descriptors.base import Descriptor, Features, as_operators
+from csm.descriptors.base import Descriptor, Features
 from csm.descriptors.windowed import ColumnNorm, require_known, surface_functions, unit_columns, windowed_energies
 from csm.errors import ConfigError
-from csm.mesh.shape import Mesh
 from csm.operators.frames import FrameKind
 from csm.operators.operators import Operators
 from csm.operators.spectrum import Spectrum
@@ -107,9 +106,8 @@ class AWFT(Descriptor):
         laplacians = [*isotropic, *(f"{a:g}deg alpha={alpha:g}" for a in self.degrees for alpha in self.alphas)]
         return tuple(f"tau={tau:g} {name} {f}" for tau in self.taus for name in laplacians for f in self.functions)
 
-    def __call__(self, shape: Mesh | Operators) -> Features:
+    def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex: for each width and Laplacian one column per function."""
-        operators = as_operators(shape)
         functions = surface_functions(
             operators, self.functions, self.k, spline_shift=self.spline_shift, index_sweeps=self.index_sweeps
         )

@@ -61,7 +61,7 @@ class Descriptor(ABC):
     """A map from a shape to one row of numbers per vertex: the base class of every family of descriptors.
 
     A family is a frozen dataclass that derives from this class.  It has its parameters as fields, a `name`, and a
-    method ``__call__``.
+    method `evaluate`.
 
     Attributes
     ----------
@@ -87,9 +87,20 @@ class Descriptor(ABC):
         """
         return int(getattr(self, "k", 0))
 
-    @abstractmethod
     def __call__(self, shape: Mesh | Operators) -> Features:
-        """Evaluate on a mesh, which is first scaled to unit area, or on operators made before, used as they are."""
+        """Evaluate on a mesh, which is first scaled to unit area, or on operators made before, used as they are.
+
+        Debris takes no part (`csm.mesh.debris`); a vertex of it has the row of the nearest vertex of the body.
+        """
+        operators = as_operators(shape)
+        if operators.body is None:
+            return self.evaluate(operators)
+        features = self.evaluate(operators.body.operators)
+        return Features(features.values[operators.body.nearest], features.columns)
+
+    @abstractmethod
+    def evaluate(self, operators: Operators) -> Features:
+        """Return the descriptor of every vertex of the mesh of `operators`, which is without debris."""
 
     def parameters(self) -> dict[str, Any]:
         """Return the parameters as plain data, without those of `added` that have their neutral value."""

@@ -7,8 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from csm.descriptors.base import Descriptor, Features, as_operators
-from csm.mesh.shape import Mesh
+from csm.descriptors.base import Descriptor, Features
 from csm.operators.operators import Operators
 
 
@@ -18,6 +17,6 @@ class Constant(Descriptor):
 
     name: ClassVar[str] = "constant"
 
-    def __call__(self, shape: Mesh | Operators) -> Features:
+    def evaluate(self, operators: Operators) -> Features:
         """Return 1 for every vertex, (N, 1)."""
-        return Features(np.ones((as_operators(shape).mesh.n_vertices, 1)), ("one",))
+        return Features(np.ones((operators.mesh.n_vertices, 1)), ("one",))

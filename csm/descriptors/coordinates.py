@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from csm.descriptors.base import Descriptor, Features, as_operators
-from csm.mesh.shape import Mesh
+from csm.descriptors.base import Descriptor, Features
 from csm.operators.operators import Operators
 
 
@@ -24,8 +23,7 @@ class Coordinates(Descriptor):
 
     name: ClassVar[str] = "xyz"
 
-    def __call__(self, shape: Mesh | Operators) -> Features:
+    def evaluate(self, operators: Operators) -> Features:
         """Return x, y and z of every vertex, (N, 3), in units of the square root of the area if that is 1."""
-        operators = as_operators(shape)
         vertices, areas = operators.mesh.vertices, operators.mass
         return Features(vertices - areas @ vertices / areas.sum(), ("x", "y", "z"))

@@ -10,9 +10,8 @@ from typing import ClassVar, Literal, NamedTuple, TypeAlias, get_args
 import numpy as np
 
 from csm._types import Float32Array, FloatArray
-from csm.descriptors.base import Descriptor, Features, as_operators
+from csm.descriptors.base import Descriptor, Features
 from csm.errors import ConfigError
-from csm.mesh.shape import Mesh
 from csm.operators.geodesic import geodesics
 from csm.operators.operators import Operators
 
@@ -104,9 +103,8 @@ class DEP(Descriptor):
         """K for the biharmonic distance; the others use no eigenpairs."""
         return self.k if self.distance == "biharmonic" else 0
 
-    def __call__(self, shape: Mesh | Operators) -> Features:
+    def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, (N, n_scales), without unit."""
-        operators = as_operators(shape)
         kernel = closeness(self._rows(operators), operators.mesh.n_vertices)
         columns = []
         for delta in self.scales[::-1]:  # descending: entries once set to zero stay zero, so one matrix is enough

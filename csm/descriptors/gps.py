@@ -7,9 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from csm.descriptors.base import Descriptor, Features, as_operators
+from csm.descriptors.base import Descriptor, Features
 from csm.errors import ConfigError
-from csm.mesh.shape import Mesh
 from csm.operators.operators import Operators
 
 
@@ -58,9 +57,8 @@ class GPS(Descriptor):
         """K and the constant one."""
         return self.k + 1
 
-    def __call__(self, shape: Mesh | Operators) -> Features:
+    def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, (N, k), without unit."""
-        operators = as_operators(shape)
         spectrum = operators.lbo(self.eigenpairs)
         zeros = spectrum.n_zero()
         if zeros > 1:  # a mesh of several components has that many constant functions

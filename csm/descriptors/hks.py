@@ -9,9 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from csm._types import FloatArray
-from csm.descriptors.base import Descriptor, Features, as_operators
+from csm.descriptors.base import Descriptor, Features
 from csm.errors import ConfigError
-from csm.mesh.shape import Mesh
 from csm.operators.operators import Operators
 
 
@@ -68,9 +67,9 @@ class HKS(Descriptor):
             return None
         return self.first, self.last
 
-    def __call__(self, shape: Mesh | Operators) -> Features:
+    def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, (N, n_times), in units of 1/area."""
-        spectrum = as_operators(shape).lbo(self.k)
+        spectrum = operators.lbo(self.k)
         if self._fixed:
             times = np.geomspace(*self._fixed, self.n_times)
         else:

@@ -12,9 +12,8 @@ from scipy.spatial import cKDTree
 
 from csm._types import FloatArray, IntArray
 from csm.descriptors.acd import unit_rows
-from csm.descriptors.base import Descriptor, Features, as_operators
+from csm.descriptors.base import Descriptor, Features
 from csm.errors import ConfigError
-from csm.mesh.shape import Mesh
 from csm.operators.operators import Operators
 
 SECTORS = 8
@@ -93,9 +92,8 @@ class SHOT(Descriptor):
         bins = product(azimuths, ("inner", "outer"), ("below", "above"), cosines)
         return tuple(f"azimuth={azimuth:.1f} {ring} {side} cos={c:.3g}" for azimuth, ring, side, c in bins)
 
-    def __call__(self, shape: Mesh | Operators) -> Features:
+    def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, (N, 32 (bins + 1)), without unit."""
-        operators = as_operators(shape)
         mesh = operators.mesh
         areas = operators.mass if self.area_weighted else np.ones(mesh.n_vertices)
         values = np.zeros((mesh.n_vertices, len(self.columns)))

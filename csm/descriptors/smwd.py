@@ -7,9 +7,8 @@ from typing import ClassVar, Literal, TypeAlias, get_args
 
 from csm.descriptors.acd import unit_rows
 from csm.descriptors.asmwd import meyer_block
-from csm.descriptors.base import Descriptor, Features, as_operators
+from csm.descriptors.base import Descriptor, Features
 from csm.errors import ConfigError
-from csm.mesh.shape import Mesh
 from csm.operators.filters import filter_names, mexican_hat_filters
 from csm.operators.operators import Operators
 
@@ -71,9 +70,9 @@ class SMWD(Descriptor):
         """Names of the columns, from coarse to fine."""
         return filter_names(self.n_filters)
 
-    def __call__(self, shape: Mesh | Operators) -> Features:
+    def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, (N, n_filters), in units of 1/area unless normalised."""
-        spectrum = as_operators(shape).lbo(self.k)
+        spectrum = operators.lbo(self.k)
         if self.variant == "meyer":
             values = meyer_block(spectrum, self.n_filters)
         else:

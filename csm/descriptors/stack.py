@@ -8,9 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from csm.descriptors.base import Descriptor, Features, as_operators, record
+from csm.descriptors.base import Descriptor, Features, record
 from csm.errors import ConfigError
-from csm.mesh.shape import Mesh
 from csm.operators.operators import Operators
 
 
@@ -51,9 +50,8 @@ class Stack(Descriptor):
         """Those of the part that asks for most."""
         return max(part.eigenpairs for part in self.parts.values())
 
-    def __call__(self, shape: Mesh | Operators) -> Features:
+    def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, (N, sum of the parts' columns)."""
-        operators = as_operators(shape)
         found = {name: part(operators) for name, part in self.parts.items()}
         columns = (f"{name} {column}" for name, features in found.items() for column in features.columns)
         return Features(np.hstack([features.values for features in found.values()]), tuple(columns))

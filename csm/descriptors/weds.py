@@ -8,9 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from csm._types import Float32Array, FloatArray, IntArray
-from csm.descriptors.base import Descriptor, Features, as_operators
+from csm.descriptors.base import Descriptor, Features
 from csm.errors import ConfigError
-from csm.mesh.shape import Mesh
 from csm.operators.filters import filter_names, mexican_hat_filters
 from csm.operators.operators import Operators
 
@@ -85,9 +84,8 @@ class WEDS(Descriptor):
         bands = filter_names(self.n_filters)
         return tuple(f"level {r + 1} {band}" for r in gathering_filters(self.n_filters, self.levels) for band in bands)
 
-    def __call__(self, shape: Mesh | Operators) -> Features:
+    def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, (N, levels S), without unit."""
-        operators = as_operators(shape)
         spectrum = operators.lbo(self.eigenpairs)
         kept = slice(spectrum.n_zero(), None)
         evals, evecs = spectrum.evals[kept], spectrum.evecs[:, kept]

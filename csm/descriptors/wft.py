@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from csm.descriptors.base import Descriptor, Features, as_operators
+from csm.descriptors.base import Descriptor, Features
 from csm.descriptors.windowed import ColumnNorm, require_known, surface_functions, unit_columns, windowed_energies
 from csm.errors import ConfigError
-from csm.mesh.shape import Mesh
 from csm.operators.operators import Operators
 
 
@@ -92,9 +91,8 @@ class WFT(Descriptor):
         """Names of the columns, width by width."""
         return tuple(f"tau={tau:g} {function}" for tau in self.taus for function in self.functions)
 
-    def __call__(self, shape: Mesh | Operators) -> Features:
+    def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, (N, T P) for T widths and P functions."""
-        operators = as_operators(shape)
         functions = surface_functions(
             operators, self.functions, self.k, spline_shift=self.spline_shift, index_sweeps=self.index_sweeps
         )

@@ -9,9 +9,8 @@ import numpy as np
 from scipy.special import softmax
 
 from csm._types import FloatArray
-from csm.descriptors.base import Descriptor, Features, as_operators
+from csm.descriptors.base import Descriptor, Features
 from csm.errors import ConfigError
-from csm.mesh.shape import Mesh
 from csm.operators.operators import Operators
 
 WaveVariant: TypeAlias = Literal["aubry", "functional_map"]
@@ -60,9 +59,9 @@ class WKS(Descriptor):
         if self.k < 2 or self.n_energies < least:
             raise ConfigError(f"{self}: wanted k of at least 2 and n_energies of at least {least}")
 
-    def __call__(self, shape: Mesh | Operators) -> Features:
+    def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, (N, n_energies), in units of 1/area."""
-        spectrum = as_operators(shape).lbo(self.k)
+        spectrum = operators.lbo(self.k)
         zeros = spectrum.n_zero()
         band = wave_band(spectrum.evals[zeros], spectrum.evals[-1], self.n_energies, self.variant)
         kept = slice(0 if self.variant == "aubry" else zeros, None)

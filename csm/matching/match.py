@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
-from typing import TypeAlias
+
+import numpy as np
 
 from csm._types import IntArray
 from csm.data.store import Store
 from csm.descriptors.base import Descriptor
 from csm.matching.base import Matcher, require_device
+from csm.matching.confidence import Confidence, there_and_back
 from csm.matching.maps import VertexMap
-from csm.matching.methods import Method, as_method
+from csm.matching.methods import Method, PrecomputedMethod, as_method
 from csm.matching.nearest import Rows, nearest
 from csm.matching.registry import matcher as as_matcher
-from csm.mesh.io import read_mesh
+from csm.matching.subjects import Cleaning, MeshLike, Subject, on_given_vertices, subject_of
+from csm.mesh.debris import body_of
 from csm.mesh.shape import Mesh
-
-MeshLike: TypeAlias = Mesh | str | os.PathLike[str]
+from csm.mesh.topology import rim
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,18 +28,24 @@ class Match:
     Parameters
     ----------
     source, target
-        The meshes.
+        The meshes, with the vertices as they were given.
     map
-        From every vertex of the source to a vertex of the target.
+        From every vertex of the source to a vertex of the target; -1 for debris and vertices in no face.
+    confidence
+        How well the vertices of the source return from the target.
     method, matcher
         How it was made.
+    notes
+        What a careful reader should know: what the files, the cleaning, the check and the comparison of both say.
     """
 
     source: Mesh
     target: Mesh
     map: VertexMap
+    confidence: Confidence
     method: Method
     matcher: Matcher
+    notes: tuple[str, ...] = ()
 
     @property
     def indices(self) -> IntArray:
@@ -60,6 +67,7 @@ def match_meshes(
     method: Method | Descriptor | str = "acd",
     matcher: Matcher | str = "nearest",
     *,
+    clean: Cleaning = "auto",
     store: Store | None = None,
     device: str = "cpu",
 ) -> Match:
@@ -74,6 +82,9 @@ def match_meshes(
         `csm.load_model`.
     matcher
         A matcher or its name: "nearest", or for networks "argmax".
+    clean
+        "auto" mends copies of the meshes first (`csm.clean`) where they need it; "off" takes them as they are.  The
+        result is on the given vertices in either case.
     store
         Where descriptors and bases are kept; by default csm's store in the user's cache folder.
     device
@@ -99,10 +110,41 @@ def match_meshes(
     Match(s00_p00 -> s00_p02 by hks, nearest)
     """
     chosen, rule, store = as_method(method), as_matcher(matcher), store or Store()
-    meshes = [mesh if isinstance(mesh, Mesh) else read_mesh(mesh) for mesh in (source, target)]
+    if isinstance(chosen, PrecomputedMethod):
+        clean = "off"  # its features are those of the given vertices
+    subjects = [subject_of(mesh, clean) for mesh in (source, target)]
     require_device(device)
-    here, there = (chosen.describe(mesh, store, device) for mesh in meshes)
-    return Match(meshes[0], meshes[1], rule(here, there), chosen, rule)
+    here, there = (chosen.describe(subject.cleaned.mesh, store, device) for subject in subjects)
+    forward = on_given_vertices(rule(here, there), subjects[0], subjects[1])
+    backward = on_given_vertices(rule(there, here), subjects[1], subjects[0])
+    given = subjects[0].given, subjects[1].given
+    confidence = there_and_back(forward, backward, given[0])
+    return Match(*given, forward, confidence, chosen, rule, _notes(*subjects))
+
+
+def _notes(source: Subject, target: Subject) -> tuple[str, ...]:
+    said = [f"{subject.given.label}: {note}" for subject in (source, target) for note in subject.notes]
+    return (*said, *_compared(source, target))
+
+
+def _compared(source: Subject, target: Subject) -> list[str]:
+    """Say what makes two shapes hard to compare: one open and one closed, several components, very few vertices."""
+    said = []
+    meshes = [subject.cleaned.mesh for subject in (source, target)]
+    rims = [rim(mesh.vertices, mesh.faces) / float(np.sqrt(mesh.area)) for mesh in meshes]
+    open_one = int(rims[1] > rims[0])
+    if rims[open_one] > 0.3 and rims[1 - open_one] < 0.1:
+        said.append(
+            f"{meshes[open_one].label} is open, {meshes[1 - open_one].label} is closed: if one is a part of the other, "
+            "what is missing has no partner, and spectra of a part differ from those of the whole, so expect a poor map"
+        )
+    parts = [body_of(mesh).n_components for mesh in meshes]
+    if parts[0] != parts[1]:
+        said.append(
+            f"{meshes[0].label} has {parts[0]} components of at least 1 % of the area and {meshes[1].label} {parts[1]}: "
+            "their spectra are hard to compare; join the components or match them one by one"
+        )
+    return said
 
 
 def match_features(

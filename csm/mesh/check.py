@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from csm._types import BoolArray, IntArray
 from csm.errors import MeshError
+from csm.mesh.debris import DEBRIS, body_of
 from csm.mesh.shape import Mesh
 from csm.mesh.topology import components, edge_keys
 
@@ -64,10 +65,10 @@ def check(mesh: Mesh) -> tuple[Finding, ...]:
     --------
     >>> square = Mesh(np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [9, 9, 9]]), np.array([[0, 1, 2]]))
     >>> [(f.kind, f.count, f.first, f.severity) for f in check(square)]
-    [('unreferenced_vertices', 1, (3,), 'error'), ('boundary', 3, (0, 1, 2), 'note')]
+    [('unreferenced_vertices', 1, (3,), 'note'), ('boundary', 3, (0, 1, 2), 'note')]
     """
     topology = _Topology(mesh)
-    finite = bool(np.isfinite(mesh.vertices).all())
+    finite = bool(np.isfinite(mesh.vertices[topology.referenced]).all())
     tests: list[Callable[[_Topology], Iterator[Finding]]] = [_faces, _references, _edges, _fans, _components]
     tests = [*tests, _degenerate, _duplicates, _scale] if finite else [_non_finite, *tests]
     findings = [finding for test in tests for finding in test(topology)]
@@ -79,8 +80,8 @@ def require_usable(mesh: Mesh) -> None:
     errors = [finding.text for finding in check(mesh) if finding.severity == "error"]
     if errors:
         raise MeshError(
-            f"{mesh.label}: {'; '.join(errors)}. Spectral operators need this mended; csm does not change meshes, "
-            "because vertex numbers are the ground truth"
+            f"{mesh.label}: {'; '.join(errors)}. Spectral operators need this mended; `csm clean` does what can be done, "
+            "and keeps the map from the old vertices to the new ones"
         )
 
 
@@ -136,7 +137,7 @@ def _found(
 
 
 def _non_finite(t: _Topology) -> Iterator[Finding]:
-    where = np.flatnonzero(~np.isfinite(t.mesh.vertices).all(axis=1))
+    where = np.flatnonzero(t.referenced & ~np.isfinite(t.mesh.vertices).all(axis=1))
     yield _found("non_finite", "error", "vertices with coordinates that are not finite", where)
 
 
@@ -147,7 +148,7 @@ def _faces(t: _Topology) -> Iterator[Finding]:
 
 def _references(t: _Topology) -> Iterator[Finding]:
     if t.mesh.n_faces and not t.referenced.all():
-        yield _found("unreferenced_vertices", "error", "vertices in no face", np.flatnonzero(~t.referenced))
+        yield _found("unreferenced_vertices", "note", "vertices in no face", np.flatnonzero(~t.referenced))
 
 
 def _degenerate(t: _Topology) -> Iterator[Finding]:
@@ -163,7 +164,7 @@ def _degenerate(t: _Topology) -> Iterator[Finding]:
         yield _found("zero_area_faces", "note", "faces of zero area", np.flatnonzero(flat))
         alive = np.zeros(mesh.n_vertices, dtype=bool)
         alive[mesh.faces[~flat]] = True
-        massless = np.flatnonzero(t.referenced & ~alive)
+        massless = np.flatnonzero(body_of(mesh).vertices & ~alive)
         if massless.size:
             yield _found("massless_vertices", "error", "vertices in faces of zero area only", massless)
 
@@ -206,13 +207,13 @@ def _orientation(t: _Topology) -> Iterator[Finding]:
     if edges.size:
         what = "edges whose two faces are oriented against each other"
         yield _found("inconsistent_orientation", "note", what, t.tails[wrong[index]], at="at vertices ")
-    elif t.mesh.n_faces and (t.edge_uses == 2).all() and np.isfinite(t.mesh.vertices).all() and _volume(t.mesh) < 0:
+    elif t.mesh.n_faces and (t.edge_uses == 2).all() and np.isfinite(t.mesh.corners).all() and _volume(t.mesh) < 0:
         yield Finding("inside_out", t.mesh.n_faces, (), "note", "all faces are oriented inwards")
 
 
 def _volume(mesh: Mesh) -> float:
     """Return the signed volume inside a closed mesh: positive if its faces are counter-clockwise from outside."""
-    centre = mesh.vertices.mean(axis=0)
+    centre = mesh.corners.mean(axis=(0, 1))
     return float(np.einsum("ij,ij->", mesh.corners[:, 0] - centre, mesh.face_crosses) / 6)
 
 
@@ -247,6 +248,11 @@ def _components(t: _Topology) -> Iterator[Finding]:
     if len(first) > 1:
         where = np.sort(first)
         yield _found("several_components", "note", "components", where, at="first vertices ")
+        body = body_of(t.mesh)
+        if body.n_debris:
+            out = first[~body.vertices[first]]
+            what = f"components of less than {DEBRIS:.0%} of the area (together {body.area_left_out:.2%}), left out"
+            yield _found("debris", "note", what, np.sort(out), at="first vertices ")
 
 
 def _scale(t: _Topology) -> Iterator[Finding]:

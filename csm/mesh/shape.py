@@ -113,9 +113,15 @@ class Mesh:
         h.update(np.ascontiguousarray(self.faces, dtype="<i8").tobytes())
         return h.hexdigest()
 
-    def unit_area(self) -> Mesh:
-        """Return the same shape scaled about the origin to a total area of 1; `scale` keeps the way back."""
-        area = self.area
+    def unit_area(self, area: float | None = None) -> Mesh:
+        """Return the same shape scaled about the origin to a total area of 1; `scale` keeps the way back.
+
+        Parameters
+        ----------
+        area
+            What to scale to 1 instead of the total area, such as the area without debris.
+        """
+        area = self.area if area is None else area
         if not (np.isfinite(area) and area > 0):
             raise MeshError(f"{self.label}: the surface area is {area}, so it cannot be scaled to 1; run `csm check`")
         length = float(np.sqrt(area))

@@ -69,3 +69,11 @@ def components(tails: IntArray, heads: IntArray, n: int) -> IntArray:
     ones = np.ones(len(tails), dtype=np.int8)
     graph = coo_array((ones, (tails, heads)), shape=(n, n))
     return connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def rim(vertices: FloatArray, faces: IntArray) -> float:
+    """Return the total length of the boundary, in the unit of `vertices`; 0 for a closed surface."""
+    tails, heads = half_edges(faces)
+    keys, first, uses = np.unique(edge_keys(tails, heads, len(vertices)), return_index=True, return_counts=True)
+    border = first[(uses == 1) & (keys % (len(vertices) + 1) != 0)]
+    return float(np.linalg.norm(vertices[heads[border]] - vertices[tails[border]], axis=1).sum())

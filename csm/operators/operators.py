@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
 from scipy import sparse
+from scipy.spatial import cKDTree
 
-from csm._types import Arrays, FloatArray
+from csm._types import Arrays, FloatArray, IntArray
 from csm.mesh.check import require_usable
+from csm.mesh.debris import Body, body_of
 from csm.mesh.shape import Mesh
 from csm.operators.frames import FrameKind, face_frames
 from csm.operators.laplacian import (
@@ -35,10 +37,38 @@ class Memo(Protocol):
         ...
 
 
+@dataclass(frozen=True, eq=False)
+class OperatorsOfBody:
+    """The operators of what is left of a mesh without its debris.
+
+    Attributes
+    ----------
+    operators
+        Of the body, a mesh of B vertices.
+    vertices
+        Shape (B,): the vertices of the whole mesh that the body has.
+    nearest
+        Shape (N,): for each vertex of the whole mesh the body's vertex nearest to it in space, itself if it is one.
+    """
+
+    operators: Operators
+    vertices: IntArray
+    nearest: IntArray
+
+    def spread(self, spectrum: Spectrum, mass: FloatArray, note: str) -> Spectrum:
+        """Return a spectrum of the body as one of the whole mesh, of vertex areas `mass`: zero on debris."""
+        evecs = np.zeros((len(mass), len(spectrum.evals)))
+        evecs[self.vertices] = spectrum.evecs
+        return replace(spectrum, evecs=evecs, mass=mass, notes=(*spectrum.notes, note))
+
+
 class Operators:
     """Laplacians and spectra of one mesh, computed when first asked for and kept.
 
     When fewer eigenpairs of a Laplacian are asked for than were computed before, they are taken from those.
+
+    Debris (`csm.mesh.debris`: components of less than 1 % of the area, and vertices in no face) takes no part: areas
+    and eigenfunctions are those of the body, and zero on debris, which a note of each spectrum says.
 
     Parameters
     ----------
@@ -57,12 +87,17 @@ class Operators:
     Attributes
     ----------
     mesh
-        The (rescaled) mesh that every result refers to.
+        The (rescaled) mesh that every result refers to; without debris it has an area of 1.
+    body
+        The operators of the mesh without its debris; None if there is none.
     """
 
     def __init__(self, mesh: Mesh, *, unit_area: bool = True, memo: Memo | None = None) -> None:
         require_usable(mesh)
-        self.mesh = mesh.unit_area() if unit_area else mesh
+        found = body_of(mesh)
+        self.mesh = mesh.unit_area(found.area) if unit_area else mesh
+        self._debris = found.note
+        self.body = None if found.is_all else _body(self.mesh, found, memo)
         self._memo = memo
         self._areas: FloatArray | None = None
         self._anisotropic: dict[tuple[FrameKind, int, float], AnisotropicStiffness] = {}
@@ -70,9 +105,12 @@ class Operators:
 
     @property
     def mass(self) -> FloatArray:
-        """Vertex areas, shape (N,)."""
+        """Vertex areas, shape (N,); zero on debris."""
         if self._areas is None:
             self._areas = vertex_areas(self.mesh)
+            if self.body is not None:
+                self._areas = np.zeros(self.mesh.n_vertices)
+                self._areas[self.body.vertices] = self.body.operators.mass
         return self._areas
 
     def anisotropic(
@@ -87,6 +125,8 @@ class Operators:
 
     def lbo(self, k: int) -> Spectrum:
         """Return the `k` smallest eigenpairs of the isotropic Laplacian."""
+        if self.body is not None:
+            return self.body.spread(self.body.operators.lbo(k), self.mass, self._debris)
         return self._spectrum("lbo", {"k": int(k)}, lambda: self._solve(stiffness(self.mesh), k))
 
     def albo(
@@ -104,6 +144,9 @@ class Operators:
         `frame`, `sweeps` and `smoothing` are those of `csm.operators.frames.face_frames`; `theta` is in radians, of
         period pi.
         """
+        if self.body is not None:
+            inner = self.body.operators.albo(alpha, theta, k, frame=frame, sweeps=sweeps, smoothing=smoothing)
+            return self.body.spread(inner, self.mass, self._debris)
         params = {
             "alpha": float(alpha),
             "theta": float(theta),
@@ -145,6 +188,17 @@ class Operators:
             if other == kind and len(spectrum.evals) > params["k"] and {**dict(items), "k": params["k"]} == params:
                 return spectrum
         return None
+
+
+def _body(mesh: Mesh, found: Body, memo: Memo | None) -> OperatorsOfBody:
+    vertices = np.flatnonzero(found.vertices)
+    number = np.cumsum(found.vertices) - 1
+    body = replace(mesh, vertices=mesh.vertices[vertices], faces=number[mesh.faces[found.faces]])
+    nearest = number.copy()
+    out = np.flatnonzero(~found.vertices)
+    places = np.nan_to_num(mesh.vertices[out])
+    nearest[out] = cKDTree(body.vertices).query(places)[1]
+    return OperatorsOfBody(Operators(body, unit_area=False, memo=memo), vertices, nearest)
 
 
 def _to_arrays(spectrum: Spectrum) -> Arrays:

@@ -139,8 +139,8 @@ class Heights(Descriptor):
     version: ClassVar[int] = 2
     added: ClassVar[dict[str, Any]] = {"factor": 1.0}
 
-    def __call__(self, shape):
-        return Features(self.factor * as_operators(shape).mesh.vertices[:, 2:], ("z",))
+    def evaluate(self, operators):
+        return Features(self.factor * operators.mesh.vertices[:, 2:], ("z",))
 
 
 def test_a_family_states_its_fields_and_gets_the_rest():
@@ -151,11 +151,11 @@ def test_a_family_states_its_fields_and_gets_the_rest():
     assert (Heights(k=7).eigenpairs, SHOT().eigenpairs, GPS(k=7).eigenpairs) == (7, 0, 8)
 
 
-def test_a_family_that_cannot_be_called_is_none():
+def test_a_family_that_cannot_be_evaluated_is_none():
     class Nothing(Descriptor):
         name = "nothing"
 
-    with pytest.raises(TypeError, match="__call__"):
+    with pytest.raises(TypeError, match="evaluate"):
         Nothing()
 
 

@@ -39,14 +39,28 @@ def test_boundary_edges_are_counted(mesh, n):
     assert found["boundary"].severity == "note"
 
 
-def test_unreferenced_vertices_are_an_error():
+def test_unreferenced_vertices_are_counted_and_take_no_part():
     ball = sphere(2)
     mesh = Mesh(np.insert(ball.vertices, [3, 10], 5.0, axis=0), np.where(ball.faces >= 3, ball.faces + 1, ball.faces))
     mesh = Mesh(mesh.vertices, np.where(mesh.faces >= 11, mesh.faces + 1, mesh.faces), "holed")
     found = kinds(mesh)["unreferenced_vertices"]
-    assert (found.count, found.first, found.severity) == (2, (3, 11), "error")
-    with pytest.raises(MeshError, match=r"holed: vertices in no face: 2 \(3, 11\)"):
-        require_usable(mesh)
+    assert (found.count, found.first, found.severity) == (2, (3, 11), "note")
+    require_usable(mesh)
+
+
+def test_unreferenced_vertices_may_have_any_place():
+    ball = sphere(2)
+    lost = Mesh(np.vstack([ball.vertices, [[np.nan, 0, 0]]]), ball.faces)
+    assert set(kinds(lost)) == {"unreferenced_vertices"}
+    require_usable(lost)
+
+
+def test_small_components_are_named_as_debris():
+    ball = sphere(2)
+    speck = Mesh(0.01 * ball.vertices + 3, ball.faces)
+    found = kinds(joined(ball, speck, moved(ball, 5)))["debris"]
+    assert (found.count, found.first, found.severity) == (1, (ball.n_vertices,), "note")
+    assert "debris" not in kinds(joined(ball, moved(ball, 5)))
 
 
 def test_duplicate_vertices_name_the_later_ones():

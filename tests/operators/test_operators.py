@@ -6,10 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from csm.descriptors import preset
 from csm.errors import MeshError
 from csm.mesh.shape import Mesh
 from csm.operators import Operators
 from csm.operators import operators as module
+from tests.mesh.test_debris import scattered
 from tests.shapes import blob, sphere
 
 
@@ -127,6 +129,27 @@ def test_floored_faces_are_recorded_also_through_a_memo():
 
 
 def test_a_mesh_that_cannot_carry_a_laplacian_is_refused():
-    broken = Mesh(np.vstack([sphere(1).vertices, [[9, 9, 9.0]]]), sphere(1).faces, "broken")
+    broken = Mesh(np.where(np.arange(42)[:, None] == 7, np.nan, sphere(1).vertices), sphere(1).faces, "broken")
     with pytest.raises(MeshError, match="broken"):
         Operators(broken)
+
+
+@pytest.mark.parametrize("ask", [lambda o: o.lbo(12), lambda o: o.albo(10.0, 0.4, 12)], ids=["lbo", "albo"])
+def test_debris_leaves_the_spectrum_of_the_body_as_it_is(ask):
+    mesh, kept = scattered(blob(3), 30, 1e-3)
+    alone, among = ask(Operators(blob(3))), ask(Operators(mesh))
+    np.testing.assert_allclose(among.evals, alone.evals, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(among.evecs[kept] ** 2, alone.evecs**2, rtol=1e-5, atol=1e-6)
+    out = np.setdiff1d(np.arange(mesh.n_vertices), kept)
+    assert not among.evecs[out].any()
+    assert not among.mass[out].any()
+    assert among.evecs.T @ (among.mass[:, None] * among.evecs) == pytest.approx(np.eye(12), abs=1e-8)
+    assert "30 components of less than 1% of the area" in among.notes[0]
+
+
+@pytest.mark.parametrize("name", ["acd", "acd_release", "hks", "wks", "shot", "dep", "weds", "wft"])
+def test_debris_leaves_descriptors_of_the_body_as_they_are(name):
+    mesh, kept = scattered(blob(3), 30, 1e-3)
+    alone, among = preset(name)(blob(3)).values, preset(name)(mesh).values
+    np.testing.assert_allclose(among[kept], alone, rtol=1e-4, atol=1e-6 * np.abs(alone).max())
+    assert np.isfinite(among).all()

@@ -1,0 +1,200 @@
+"""One paragraph for every error that a user can mend, whoever raised it: csm, the operating system, Hydra, Lightning."""
+
+from __future__ import annotations
+
+import errno
+import re
+import zipfile
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from hydra import compose, initialize_config_dir
+from hydra.core.global_hydra import GlobalHydra
+from hydra.errors import HydraException, InstantiationException, MissingConfigException
+from omegaconf import OmegaConf
+from omegaconf.errors import (
+    InterpolationKeyError,
+    InterpolationResolutionError,
+    MissingMandatoryValue,
+    OmegaConfBaseException,
+)
+
+from csm.commands.groups import config_folder, options_of
+from csm.commands.words import nearest_names
+from csm.errors import CsmError
+
+_EXTRAS = {
+    "joblib": "sweep",
+    "submitit_local": "sweep",
+    "submitit_slurm": "sweep",
+    "optuna": "sweep",
+    "polyscope": "viz",
+    "anny": "prep",
+}
+"""What is missing -> the extra of csm that brings it."""
+
+_MOVED = {f"optimizer.{name}": f"learning.{name}" for name in ("loss_products", "loss_rows", "rotate")}
+"""Options of earlier versions -> where they are now."""
+
+_ADVICE = {
+    errno.ENOSPC: "the disk is full; free some space, or choose another folder",
+    errno.EDQUOT: "your quota of disk space is used up; free some space, or choose another folder",
+    errno.EACCES: "permission denied; choose a place that you may read and write",
+    errno.EPERM: "permission denied; choose a place that you may read and write",
+    errno.EROFS: "the file system is read-only; choose another place",
+    errno.ENAMETOOLONG: "the name is too long for the file system; choose a shorter one",
+    errno.ENOTDIR: "a file stands where a folder is wanted; choose another place",
+    errno.EISDIR: "this is a folder, wanted a file",
+    errno.EEXIST: "a file stands where a folder is wanted; choose another place",
+    errno.ENOENT: "there is no such file or folder",
+    errno.EMFILE: "too many files are open; use fewer workers, or raise the limit (ulimit -n)",
+}
+
+
+def explained(error: BaseException, config_name: str) -> str | None:
+    """Return a paragraph for an error that the user can mend, or None for a defect of csm.
+
+    Parameters
+    ----------
+    error
+        What was raised.
+    config_name
+        The yaml of the command, whose keys are offered where one is misspelt.
+    """
+    for one in _chain(error):
+        if isinstance(one, CsmError):
+            return str(one)
+    for one in _chain(error):
+        text = _explained(one, config_name)
+        if text:
+            return text
+    return None
+
+
+def _chain(error: BaseException) -> Iterator[BaseException]:
+    """Yield an error and what it was raised from, the outermost first."""
+    seen: BaseException | None = error
+    while seen is not None:
+        yield seen
+        seen = seen.__cause__ or (None if seen.__suppress_context__ else seen.__context__)
+
+
+def _explained(error: BaseException, config_name: str) -> str | None:
+    if isinstance(error, OSError) and error.errno is not None:
+        return _of_the_system(error)
+    if isinstance(error, MissingConfigException):
+        return _missing_option(error)
+    if isinstance(error, InstantiationException):
+        return _not_made(error)
+    if isinstance(error, HydraException | OmegaConfBaseException):
+        return _of_hydra(error, config_name)
+    if isinstance(error, ValueError) and "Config group override must be" in str(error):
+        return "a group takes the name of one of its options, such as descriptor=acd; csm COMMAND --help lists them"
+    if isinstance(error, ModuleNotFoundError) and (error.name or "") in _EXTRAS:
+        return _extra(str(error.name))
+    if isinstance(error, MemoryError):
+        return f"there is not enough memory ({error}); use fewer workers, smaller meshes, or another descriptor"
+    if isinstance(error, zipfile.BadZipFile):
+        return f"an archive is damaged ({error})"
+    return _of_torch(error)
+
+
+def _of_the_system(error: OSError) -> str:
+    place = ", ".join(str(name) for name in (error.filename, error.filename2) if name is not None)
+    why = _ADVICE.get(error.errno or 0, error.strerror or str(error))
+    return f"{place}: {why}" if place else f"{why} ({error})"
+
+
+def _missing_option(error: MissingConfigException) -> str:
+    missing = error.missing_cfg_file or ""
+    group, _, name = missing.rpartition("/")
+    if name in _EXTRAS and group.startswith("hydra"):
+        return _extra(name, f"{group}={name}")
+    options = options_of(group) if not group.startswith("hydra") else list(error.options or [])
+    if not options:
+        return f"there is no configuration {missing!r}; csm COMMAND --help lists the groups and their options"
+    return f"{group}={name}: there is no such option{nearest_names(name, options)}; there are {', '.join(options)}"
+
+
+def _extra(name: str, wanted: str = "") -> str:
+    return f"{wanted or name} needs an extra that is not installed: pip install 'csm[{_EXTRAS[name]}]'"
+
+
+def _not_made(error: InstantiationException) -> str | None:
+    text = str(error.__cause__ or error)
+    key = re.search(r"full_key: ([\w.]+)", str(error))
+    where = f"{key[1]}: " if key else ""
+    unknown = re.search(r"unexpected keyword argument '(\w+)'", str(error))
+    if unknown:
+        return f"{where}there is no option {unknown[1]!r}; --cfg job shows those that there are"
+    if re.search(r"missing \d+ required", str(error)):
+        return f"{where}{text.splitlines()[0]}"
+    if re.search(r"Error locating target|Could not load|ModuleNotFound", str(error)):
+        return f"{where}{str(error).splitlines()[0]}; _target_ wants the place of a class, such as csm.descriptors.ACD"
+    return None
+
+
+def _of_hydra(error: BaseException, config_name: str) -> str:
+    text = str(error)
+    if isinstance(error, MissingMandatoryValue):
+        key = re.search(r"full_key: ([\w.]+)", text) or re.search(r"Missing mandatory value: ([\w.]+)", text)
+        name = key[1] if key else "an option"
+        return f"{name} has to be given: {name}=VALUE"
+    if isinstance(error, InterpolationKeyError | InterpolationResolutionError):
+        return f"a reference in the configuration leads nowhere: {text.splitlines()[0]}"
+    key = re.search(r"Could not override '([^']+)'", text) or re.search(r"full_key: ([\w.]+)", text)
+    if key:
+        return _unknown_key(key[1], config_name)
+    gone = re.search(r"Could not delete from config. '([^']+)'", text)
+    if gone:
+        return f"~{gone[1]}: there is no such key to leave out; --cfg job shows the configuration"
+    parsed = re.search(r"Error parsing override '(.*)'", text) or re.search(r"at input '(.*)'", text)
+    if parsed:
+        return (
+            f"{parsed[1]!r} is not of the form key=value that Hydra reads; values with = ( ) [ ] {{ }} ' , or # want "
+            "quotes inside of the shell's: \"key='value'\""
+        )
+    return " ".join(text.split())
+
+
+def _unknown_key(key: str, config_name: str) -> str:
+    if key in _MOVED:
+        return f"{key} is now {_MOVED[key]}"
+    keys = known_keys(config_name)
+    last = {name.rpartition(".")[2]: name for name in keys}
+    near = nearest_names(key, keys) or nearest_names(key.rpartition(".")[2], last)
+    return f"there is no option {key!r}{near}; --help lists the options, --cfg job the settings of what is chosen"
+
+
+def known_keys(config_name: str) -> list[str]:
+    """Return all keys of the configuration of a command as it is without options, nested ones with dots."""
+    GlobalHydra.instance().clear()
+    try:
+        with initialize_config_dir(str(config_folder()), version_base="1.3"):
+            return list(_flat(OmegaConf.to_container(compose(config_name), resolve=False)))
+    except Exception:
+        return []
+
+
+def _flat(node: Any, above: str = "") -> Iterator[str]:
+    if not isinstance(node, Mapping):
+        return
+    for key, value in node.items():
+        name = f"{above}{key}"
+        yield name
+        yield from _flat(value, f"{name}.")
+
+
+def _of_torch(error: BaseException) -> str | None:
+    """Explain errors of PyTorch and Lightning, by their names: neither is imported by commands that do without."""
+    kind, text = type(error).__name__, str(error)
+    first = next((line.strip() for line in text.splitlines() if line.strip()), kind)
+    if kind == "MisconfigurationException":
+        return f"the trainer refuses its settings: {first}"
+    if kind in ("OutOfMemoryError", "AcceleratorError") or "out of memory" in text:
+        return f"the graphics card cannot do this: {first}; choose device=cpu and trainer=cpu, or smaller meshes"
+    if isinstance(error, RuntimeError) and re.search(
+        r"No CUDA GPUs|Found no NVIDIA driver|not compiled with CUDA", text
+    ):
+        return f"there is no graphics card that PyTorch can use ({first}); choose device=cpu and trainer=cpu"
+    return None

@@ -1,0 +1,121 @@
+"""``csm COMMAND --help``: options with what they mean, and groups with what can be chosen, from the yaml files alone."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from dataclasses import dataclass, field
+
+from csm.commands.groups import config_folder, options_of
+from csm.commands.words import WORDS
+
+_OPTION = re.compile(r"(?P<key>\w+):\s*(?P<value>[^#]*?)\s*(?:#\s*(?P<words>.*))?")
+_ITEM = re.compile(
+    r"\s+- (?:(?:override )?/?(?P<group>[\w/]+): (?P<choice>[\w/]+)|(?P<file>\w+))\s*(?:#\s*(?P<words>.*))?"
+)
+_WIDTH = 110
+
+
+@dataclass
+class Page:
+    """What the yaml of a command says: its purpose, options (key, default, words) and groups (name, default, words)."""
+
+    purpose: list[str] = field(default_factory=list)
+    options: list[tuple[str, str, str]] = field(default_factory=list)
+    groups: list[tuple[str, str, str]] = field(default_factory=list)
+
+
+def read_page(config_name: str) -> Page:
+    """Read the yaml of a command, and those that it builds on."""
+    page = Page()
+    _read(config_name, page)
+    return page
+
+
+def _read(config_name: str, page: Page) -> None:
+    text = (config_folder() / f"{config_name}.yaml").read_text(encoding="utf-8")
+    section, began = "", False
+    for line in text.splitlines():
+        if line.startswith("#") and not began:
+            if not page.options:
+                page.purpose.append(line.lstrip("# "))
+            continue
+        began = True
+        if not line.startswith((" ", "#")) and line.strip():
+            section = line.partition(":")[0]
+        item = _ITEM.fullmatch(line) if section == "defaults" else None
+        if item and item["group"]:
+            page.groups.append((item["group"], item["choice"], item["words"] or ""))
+        elif item and item["file"] not in ("_self_", "studies"):
+            _inherit(item["file"], page)
+        option = _OPTION.fullmatch(line)
+        if option and section not in ("defaults", "hydra") and option["value"]:
+            page.options.append((option["key"], option["value"], option["words"] or ""))
+
+
+def _inherit(config_name: str, page: Page) -> None:
+    above = read_page(config_name)
+    page.options += above.options
+    page.groups += above.groups
+
+
+def help_text(command: str, config_name: str, more: str = "") -> str:
+    """Return the help of a command.
+
+    Parameters
+    ----------
+    command
+        Such as "match".
+    config_name
+        Name of its yaml.
+    more
+        What comes after the purpose, such as a list of studies.
+    """
+    page = read_page(config_name)
+    own = sorted(page.options, key=lambda option: option[0] in {key for key, *_ in read_page("common").options})
+    words = " ".join(f"[{key.upper()} ...]" if key == "targets" else key.upper() for key in WORDS.get(command, ()))
+    lines = [f"usage: csm {command} {words} [key=value ...]".replace("  ", " "), ""]
+    lines += [*textwrap.wrap(" ".join(page.purpose), _WIDTH), ""]
+    lines += [more, ""] if more else []
+    lines += ["options, with their defaults:", *_table([(f"{key}={value}", text) for key, value, text in own])]
+    for group, choice, _ in page.groups:
+        rows = [(f"{group}.{key}={value}", text) for key, value, text in _settings(group, choice)]
+        lines += ["", f"settings of the group {group}:", *_table(rows)] if rows else []
+    groups = [row for row in page.groups if len(options_of(row[0])) > 1]
+    if groups:
+        lines += ["", "groups, of which one option each is chosen as GROUP=OPTION:"]
+        lines += _table([(group, _choices(group, choice, text)) for group, choice, text in page.groups])
+        lines += ["", "An option has settings of its own, such as descriptor.k=20; --cfg job shows all of them."]
+    lines += [
+        "",
+        "--cfg job shows the resolved configuration and does nothing; -m key=a,b,c runs every combination;",
+        "debug=true shows the traceback of an error.",
+    ]
+    return "\n".join(lines)
+
+
+def _settings(group: str, choice: str) -> list[tuple[str, str, str]]:
+    """Return the settings of the only option of a group."""
+    if options_of(group) != [choice] or not (config_folder() / group / f"{choice}.yaml").is_file():
+        return []
+    lines = (config_folder() / group / f"{choice}.yaml").read_text(encoding="utf-8").splitlines()
+    found = (_OPTION.fullmatch(line) for line in lines)
+    return [(option["key"], option["value"], option["words"] or "") for option in found if option]
+
+
+def _choices(group: str, choice: str, text: str) -> str:
+    names = [f"{name} (default)" if name == choice else name for name in options_of(group)]
+    return ", ".join(names) + (f": {text}" if text else "")
+
+
+def _table(rows: list[tuple[str, str]]) -> list[str]:
+    width = min(max(len(left) for left, _ in rows), 34)
+    lines: list[str] = []
+    for left, right in rows:
+        wrapped = textwrap.wrap(right, _WIDTH - width - 4) or [""]
+        if len(left) > width:
+            lines.append(f"  {left}")
+            left = ""
+        lines.append(f"  {left:<{width}}  {wrapped[0]}".rstrip())
+        lines += [f"{'':{width + 4}}{line}" for line in wrapped[1:]]
+    return lines

@@ -1,0 +1,192 @@
+"""From what a user types to what Hydra parses: words without a key, paths with any characters, flags in any place.
+
+Hydra has a grammar of its own, in which ``= ( ) [ ] { } ' , #`` and letters beyond ASCII mean something or are refused.
+The values of keys that are paths are therefore quoted here, so that any path can be typed as the shell takes it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from csm.errors import ConfigError
+
+WORDS: dict[str, tuple[str, ...]] = {
+    "match": ("source", "target", "out"),
+    "describe": ("mesh", "out"),
+    "clean": ("in", "out"),
+    "check": ("folder",),
+    "evaluate": ("checkpoint",),
+    "reproduce": ("targets",),
+    "bench": ("targets",),
+}
+"""Commands that take words without a key, with the keys that the words are for, in order."""
+
+LISTS = ("targets",)
+"""Keys that take all words."""
+
+PATHS = frozenset(
+    [
+        "source",
+        "target",
+        "out",
+        "mesh",
+        "in",
+        "checkpoint",
+        "folder",
+        "resume",
+        "results",
+        "store",
+        "data.root",
+        "data.split",
+        "data.test_roots",
+    ]
+)
+"""Keys whose values are paths, or lists of them."""
+
+_ALONE = {"-m", "--multirun", "-r", "--run", "--resolve", "--help", "-h", "--hydra-help", "--version"}
+_KEY = re.compile(r"[+~]{0,2}[A-Za-z_][\w./@:-]*")
+
+
+def to_overrides(command: str, arguments: Sequence[str]) -> list[str]:
+    """Return the arguments of a command as Hydra takes them.
+
+    Parameters
+    ----------
+    command
+        Such as "match".
+    arguments
+        As they were typed.
+
+    Raises
+    ------
+    ConfigError
+        If there is a word too many, or a word where only key=value is taken.
+
+    Examples
+    --------
+    >>> to_overrides("match", ["my body (1).off", "b.ply", "out=2024"])
+    ["source='my body (1).off'", "target='b.ply'", "out='2024'"]
+    >>> to_overrides("train", ["experiment=humans", "-m", "seed=0,1"])
+    ['-m', 'experiment=humans', 'seed=0,1']
+    """
+    sweeping = any(argument in ("-m", "--multirun") for argument in arguments)
+    words: list[str] = []
+    flags: list[str] = []
+    options: list[str] = []
+    overrides: list[str] = []
+    for before, argument in zip(("", *arguments), arguments, strict=False):
+        if argument in ("-m", "--multirun"):
+            flags.append(argument)
+        elif (argument.startswith("-") and not Path(argument).exists()) or (
+            before.startswith("-") and before not in _ALONE and "=" not in before
+        ):
+            options.append(argument)
+        elif _is_word(argument):
+            words.append(argument)
+        else:
+            overrides.append(_override(argument, sweeping))
+    return [*flags, *_named(command, words), *overrides, *options]
+
+
+def _is_word(argument: str) -> bool:
+    key, equals, _ = argument.partition("=")
+    if argument and os.path.lexists(os.path.expanduser(argument)):
+        return True
+    if argument.startswith(("~", "+")) and _KEY.fullmatch(key):
+        return False
+    return not (equals and _KEY.fullmatch(key))
+
+
+def _named(command: str, words: Sequence[str]) -> list[str]:
+    """Give the words their keys."""
+    keys = WORDS.get(command, ())
+    if not words:
+        return []
+    if keys and keys[0] in LISTS:
+        return [f"{keys[0]}=[{','.join(words)}]"]
+    if len(words) > len(keys):
+        extra = words[len(keys)]
+        takes = f"takes {' '.join(key.upper() for key in keys)} and " if keys else "takes "
+        raise ConfigError(f"csm {command} {takes}options of the form key=value, got {extra!r}{_meant(extra)}")
+    return [f"{key}={quoted(os.path.expanduser(word))}" for key, word in zip(keys, words, strict=False)]
+
+
+def _meant(word: str) -> str:
+    from csm.commands.groups import options_of
+
+    for group in ("experiment", "descriptor", "model", "data", "recipe"):
+        if word in options_of(group):
+            return f"; did you mean {group}={word}?"
+    return ""
+
+
+def _override(argument: str, sweeping: bool) -> str:
+    key, equals, value = argument.partition("=")
+    if key in PATHS and value not in ("", "null"):
+        return f"{key}={_path_value(value, sweeping)}"
+    return without_null(argument) if equals else argument
+
+
+def _path_value(value: str, sweeping: bool) -> str:
+    if _is_quoted(value) or value.startswith("${"):
+        return value
+    whole = os.path.expanduser(value)
+    if os.path.lexists(whole):
+        return quoted(whole)
+    if value.startswith("[") and value.endswith("]"):
+        return f"[{','.join(_each(value[1:-1]))}]"
+    if sweeping and "," in value:
+        return ",".join(_each(value))
+    return quoted(whole)
+
+
+def _each(values: str) -> Iterable[str]:
+    return (v if _is_quoted(v) else quoted(os.path.expanduser(v)) for v in map(str.strip, values.split(",")) if v)
+
+
+def _is_quoted(value: str) -> bool:
+    return len(value) > 1 and value[0] == value[-1] and value[0] in "'\""
+
+
+def quoted(value: str) -> str:
+    r"""Return a value in quotes that Hydra takes off again, whatever characters it has.
+
+    Examples
+    --------
+    >>> print(quoted("it's=[1], ok"))
+    'it\'s=[1], ok'
+    """
+    escaped = re.sub(r"(\\*)'", lambda found: found[1] * 2 + r"\'", value)
+    end = re.search(r"\\+$", escaped)
+    return f"'{escaped}{end[0] if end else ''}'"
+
+
+def without_null(argument: str) -> str:
+    """Return ``logger=none`` for ``logger=null``, which Hydra refuses for a group; other arguments stay.
+
+    Examples
+    --------
+    >>> without_null("logger=null"), without_null("resume=null")
+    ('logger=none', 'resume=null')
+    """
+    from csm.commands.groups import config_folder
+
+    group, equals, value = argument.partition("=")
+    has_none = group.isidentifier() and (config_folder() / group / "none.yaml").is_file()
+    return f"{group}=none" if has_none and value in ("null", "") and equals else argument
+
+
+def nearest_names(name: str, names: Iterable[str]) -> str:
+    """Return a question that offers the names most like a misspelt one, or an empty string.
+
+    Examples
+    --------
+    >>> nearest_names("adc", ["acd", "hks"])
+    '; did you mean acd?'
+    """
+    close = difflib.get_close_matches(name, list(names), n=3, cutoff=0.6)
+    return f"; did you mean {' or '.join(close)}?" if close else ""

@@ -1,0 +1,104 @@
+"""What is matched: a mesh as it was given, its cleaned copy that is computed on, and what is to be said of both."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+
+from csm._types import IntArray
+from csm.errors import ConfigError
+from csm.matching.maps import VertexMap
+from csm.mesh.check import Finding, check
+from csm.mesh.clean import Cleaned, clean
+from csm.mesh.io import read_polygons
+from csm.mesh.polygons import PolygonMesh, triangulated
+from csm.mesh.shape import Mesh
+
+MeshLike: TypeAlias = Mesh | PolygonMesh | str | os.PathLike[str]
+Cleaning: TypeAlias = Literal["auto", "off"]
+
+_MENDED = {
+    "inside_out": "orient",
+    "inconsistent_orientation": "orient",
+    "duplicate_vertices": "weld",
+    "debris": "debris",
+    "unreferenced_vertices": "unreferenced",
+}
+"""Findings that need no word of their own where this step of cleaning has one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """One of two meshes to match.
+
+    Parameters
+    ----------
+    given
+        The mesh with the vertices that results refer to; polygons are triangulated on these vertices.
+    cleaned
+        What descriptors are computed on, with the map from the given vertices.
+    findings
+        What `csm.check` finds in the given mesh and cleaning did not mend.
+    """
+
+    given: Mesh
+    cleaned: Cleaned
+    findings: tuple[Finding, ...]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on the file, on what was mended for the computation, and on what remains."""
+        said = list(self.given.notes)
+        if self.cleaned.text:
+            said.append(f"cleaned for the computation, results are on the vertices of the file: {self.cleaned.text}")
+        remaining = "; ".join(finding.text for finding in self.findings)
+        return tuple([*said, *([remaining] if remaining else [])])
+
+
+def subject_of(mesh: MeshLike, cleaning: Cleaning = "auto") -> Subject:
+    """Read a mesh if it is a file, check it, and clean it unless cleaning is "off".
+
+    Debris and vertices in no face are left out of the computation in either case.
+
+    Raises
+    ------
+    ConfigError
+        If it is no mesh, or there is no such way of cleaning.
+    MeshError
+        If the file cannot be read, or cleaning is off and the mesh cannot be used.
+    """
+    if cleaning not in get_args(Cleaning):
+        raise ConfigError(f"clean={cleaning}; wanted {' or '.join(get_args(Cleaning))}")
+    polygons = _read(mesh)
+    if isinstance(polygons, PolygonMesh) and (cleaning == "off" or polygons.all_triangles):
+        polygons = polygons.triangles()
+    given = polygons if isinstance(polygons, Mesh) else triangulated(polygons).mesh
+    cleaned = clean(polygons) if cleaning == "auto" else clean(polygons, weld=False, split=False, orient=False)
+    mended = {mend.kind for mend in cleaned.mends}
+    findings = tuple(f for f in check(given) if _MENDED.get(f.kind) not in mended)
+    if cleaned.mends:
+        left = {finding.kind for finding in check(cleaned.mesh)}
+        findings = tuple(finding for finding in findings if finding.kind in left)
+    return Subject(given, cleaned, findings)
+
+
+def _read(mesh: MeshLike) -> Mesh | PolygonMesh:
+    if isinstance(mesh, Mesh | PolygonMesh):
+        return mesh
+    if isinstance(mesh, str | os.PathLike):
+        return read_polygons(mesh)
+    raise ConfigError(
+        f"a mesh is a file or what csm.read_mesh returns, got a {type(mesh).__name__}; for arrays there is "
+        "csm.Mesh(vertices, faces)"
+    )
+
+
+def on_given_vertices(found: VertexMap, source: Subject, target: Subject) -> VertexMap:
+    """Return a map between the cleaned meshes as one between the given ones; -1 for vertices that were left out."""
+    at = source.cleaned.vertex_map
+    mapped = np.where(at >= 0, found.indices[at], -1)
+    indices: IntArray = np.where(mapped >= 0, target.cleaned.origin[mapped], -1)
+    return VertexMap(indices, target.given.n_vertices, source.given.name, target.given.name)

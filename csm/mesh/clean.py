@@ -1,0 +1,247 @@
+"""Cleaning of a mesh, step by step and on request, with the map from its old vertices to the new ones.
+
+Nothing here is done unasked: vertex numbers are the ground truth, so reading never repairs.  `clean` returns a new mesh
+and both maps, with which labels and correspondences carry over in either direction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from csm._types import BoolArray, FloatArray, IntArray
+from csm.errors import ConfigError
+from csm.mesh.check import FLAT
+from csm.mesh.debris import DEBRIS, body_of
+from csm.mesh.mending import collapsed, sound_faces, split, turns, welded
+from csm.mesh.polygons import PolygonMesh, triangulated
+from csm.mesh.shape import Mesh
+
+SAME_PLACE = 1e-7
+"""Distance below which boundary vertices are welded, as a fraction of the bounding box's diagonal."""
+
+STEPS = ("weld", "split", "debris", "orient")
+"""The steps that can be left out; polygons, faces without three corners and vertices in no face always go."""
+
+
+@dataclass(frozen=True)
+class Mend:
+    """One step that changed something: its kind, how many things it changed, and a phrase for people."""
+
+    kind: str
+    count: int
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Cleaned:
+    """A cleaned mesh and where its vertices come from.
+
+    Parameters
+    ----------
+    mesh
+        The new mesh.
+    vertex_map
+        Shape (N_old,): the new vertex of each old one, -1 where it was left out.
+    origin
+        Shape (N_new,): the old vertex that each new one is (the first, where several were welded).
+    face_map
+        Shape (M_new,): the old face that each new one is, or is a part of.
+    mends
+        What was done, in order; empty for a mesh that needed nothing.
+    """
+
+    mesh: Mesh
+    vertex_map: IntArray
+    origin: IntArray
+    face_map: IntArray
+    mends: tuple[Mend, ...] = ()
+
+    @property
+    def text(self) -> str:
+        """What was done, in one line; empty for nothing."""
+        return "; ".join(mend.text for mend in self.mends)
+
+    def carried(self, values: FloatArray) -> FloatArray:
+        """Return values per old vertex, shape (N_old, ...), as values per new vertex, shape (N_new, ...)."""
+        return values[self.origin]
+
+    def __repr__(self) -> str:
+        return f"Cleaned({self.mesh!r}, {self.text or 'nothing to do'})"
+
+
+def clean(
+    mesh: Mesh | PolygonMesh,
+    *,
+    weld: bool = True,
+    split: bool = True,
+    debris: float = DEBRIS,
+    orient: bool = True,
+    tolerance: float = SAME_PLACE,
+) -> Cleaned:
+    """Mend a mesh so that descriptors can be computed on it.
+
+    In this order: polygons become triangles; boundary vertices at the same place are welded; faces without three
+    different corners and repeated faces go; vertices with faces of zero area only are joined with their nearest
+    neighbour; non-manifold edges and vertices are cut apart; debris goes; vertices in no face go; faces are oriented
+    alike, and outwards where the surface is closed.
+
+    Parameters
+    ----------
+    mesh
+        The mesh, also with polygons (`csm.mesh.io.read_polygons`); it is not changed.
+    weld, split, orient
+        Whether to take these steps.
+    debris
+        Components below this fraction of the area go; 0 keeps all.
+    tolerance
+        Of welding, as a fraction of the bounding box's diagonal.
+
+    Returns
+    -------
+    Cleaned
+        The mesh, the maps between old and new vertices, and what was done.
+
+    Raises
+    ------
+    ConfigError
+        If `debris` or `tolerance` is not from 0 to below 1.
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 0, 0], [1, 1, 0], [0, 1, 0], [9, 9, 9]])
+    >>> done = clean(Mesh(corners, np.array([[0, 1, 2], [3, 4, 5]])))
+    >>> done.mesh.n_vertices, done.vertex_map
+    (4, array([ 0,  1,  2,  0,  2,  3, -1]))
+    >>> done.text
+    '2 vertices welded to another at the same place; 1 vertices in no face left out'
+    """
+    for name, value in (("debris", debris), ("tolerance", tolerance)):
+        if not 0 <= value < 1:
+            raise ConfigError(f"{name}={value}; wanted a fraction from 0 to below 1")
+    work = _Work.of(mesh)
+    if weld:
+        work.weld(tolerance)
+    work.drop_unsound_faces()
+    work.collapse()
+    if split:
+        work.split()
+    lone = ~work.used()
+    if debris:
+        work.drop_debris(debris)
+    work.drop_unused(lone)
+    if orient:
+        work.orient()
+    return work.done(mesh)
+
+
+@dataclass
+class _Work:
+    """A mesh while it is cleaned, with its way back."""
+
+    vertices: FloatArray
+    faces: IntArray
+    vertex_map: IntArray  # old -> present
+    origin: IntArray  # present -> old
+    face_map: IntArray  # present -> old
+    mends: list[Mend] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, mesh: Mesh | PolygonMesh) -> _Work:
+        mends = []
+        if isinstance(mesh, Mesh):
+            triangles, face_map = mesh, np.arange(mesh.n_faces)
+        else:
+            triangles, face_map = triangulated(mesh)
+            count = int((mesh.sizes != 3).sum())
+            if count:
+                mends.append(Mend("triangulate", count, f"{count} polygons triangulated"))
+        n = np.arange(triangles.n_vertices)
+        return cls(triangles.vertices.copy(), triangles.faces.copy(), n, n.copy(), face_map, mends)
+
+    def _did(self, kind: str, count: int, text: str) -> None:
+        if count:
+            self.mends.append(Mend(kind, count, f"{count} {text}"))
+
+    def _flat(self) -> BoolArray:
+        corners = self.vertices[self.faces]
+        longest = ((np.roll(corners, -1, axis=1) - corners) ** 2).sum(axis=2).max(axis=1)
+        crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        flat: BoolArray = np.linalg.norm(crosses, axis=1) / 2 <= FLAT * longest
+        return flat
+
+    def used(self) -> BoolArray:
+        """Which present vertices some face uses; those that were joined with another count as used."""
+        used = np.zeros(len(self.vertices), dtype=bool)
+        used[self.faces] = True
+        return used
+
+    def _join(self, target: IntArray) -> int:
+        """Let each vertex be `target` of it, and return how many were joined with another."""
+        self.faces, self.vertex_map = target[self.faces], target[self.vertex_map]
+        return int((target != np.arange(len(target))).sum())
+
+    def weld(self, tolerance: float) -> None:
+        count = self._join(welded(self.vertices, self.faces, tolerance))
+        self._did("weld", count, "vertices welded to another at the same place")
+
+    def _keep_faces(self, kept: BoolArray) -> int:
+        self.faces, self.face_map = self.faces[kept], self.face_map[kept]
+        return int((~kept).sum())
+
+    def drop_unsound_faces(self) -> None:
+        count = self._keep_faces(sound_faces(self.faces))
+        self._did("faces", count, "faces left out: corners that coincide, or a face twice")
+
+    def collapse(self) -> None:
+        total = 0
+        for _ in range(5):
+            count = self._join(collapsed(self.vertices, self.faces, self._flat()))
+            if not count:
+                break
+            total += count
+            self._keep_faces(sound_faces(self.faces))
+        self._did("collapse", total, "vertices with faces of zero area only joined with their nearest neighbour")
+
+    def split(self) -> None:
+        before = len(self.vertices)
+        self.faces, origin = split(self.vertices, self.faces)
+        self.vertices, self.origin = self.vertices[origin], self.origin[origin]
+        count = len(origin) - before
+        self._did("split", count, "copies of vertices made where the surface was no manifold")
+
+    def drop_debris(self, fraction: float) -> None:
+        body = body_of(Mesh(self.vertices, self.faces), fraction)
+        if body.n_debris:
+            self._keep_faces(body.faces)
+            text = (
+                f"pieces of debris left out: each below {fraction:.2g} of the area, together {body.area_left_out:.2%}"
+            )
+            self._did("debris", body.n_debris, text)
+
+    def drop_unused(self, lone: BoolArray) -> None:
+        used = self.used()
+        present = np.zeros(len(used), dtype=bool)
+        present[self.vertex_map] = True
+        number = np.where(used, np.cumsum(used) - 1, -1)
+        self.faces, self.vertex_map = number[self.faces], number[self.vertex_map]
+        self.vertices, self.origin = self.vertices[used], self.origin[used]
+        self._did("unreferenced", int((lone & present & ~used).sum()), "vertices in no face left out")
+
+    def orient(self) -> None:
+        found = turns(self.vertices, self.faces)
+        self.faces[found.flip] = self.faces[found.flip][:, ::-1]
+        whole = found.n_inside_out
+        text = "faces turned: " + (
+            "inside out as a whole" if whole and found.flip.all() else "against their neighbours"
+        )
+        self._did("orient", int(found.flip.sum()), text)
+        self._did("one_sided", found.n_one_sided, "components are one-sided and cannot be oriented")
+
+    def done(self, mesh: Mesh | PolygonMesh) -> Cleaned:
+        if not self.mends and isinstance(mesh, Mesh):
+            return Cleaned(mesh, self.vertex_map, self.origin, self.face_map)
+        scale = mesh.scale if isinstance(mesh, Mesh) else 1.0
+        new = Mesh(self.vertices, self.faces, mesh.name, scale, mesh.source, mesh.notes)
+        return Cleaned(new, self.vertex_map, self.origin, self.face_map, tuple(self.mends))
