@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 from collections.abc import Callable, Iterable, Iterator, Sized
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from typing import ParamSpec, TypeVar
+from functools import partial
+from typing import Any, ParamSpec, TypeVar
 
 from threadpoolctl import threadpool_limits
 
 from csm._progress import progress_bar
+from csm._workers import Worker, crew, death, ready
+from csm.errors import ConfigError
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -20,12 +21,24 @@ P = ParamSpec("P")
 def n_processes(workers: int | None, n_tasks: int) -> int:
     """Return how many processes to start: as many as asked for; by default one per core, none for fewer than 3 tasks.
 
+    Raises
+    ------
+    ConfigError
+        If `workers` is neither None nor a whole number from 0 on.
+
     Examples
     --------
     >>> n_processes(None, 2), n_processes(4, 2)
     (0, 4)
     """
-    return workers if workers is not None else (os.cpu_count() or 1) if n_tasks > 2 else 0
+    if workers is None:
+        return (os.cpu_count() or 1) if n_tasks > 2 else 0
+    if isinstance(workers, bool) or not hasattr(workers, "__index__") or workers < 0:
+        raise ConfigError(
+            f"workers={workers}: wanted a whole number of processes (0 works in this process, without others), "
+            "or null for one per core"
+        )
+    return int(workers)
 
 
 def parallel_map(
@@ -38,8 +51,12 @@ def parallel_map(
     unit: str,
     total: int | None = None,
     progress: bool = True,
+    on_result: Callable[[R], object] | None = None,
 ) -> list[R]:
     """Apply a function to every task, and return the results in the order of the tasks.
+
+    The processes end with this call: at once if it is stopped by Ctrl-C, SIGTERM or an error, and also if this process
+    is killed.
 
     Parameters
     ----------
@@ -48,7 +65,7 @@ def parallel_map(
     tasks
         Objects that can be pickled.  They may be made one by one: a process works on the first while the next is made.
     label
-        Names a task in the progress bar.
+        Names a task in the progress bar and in errors.
     workers
         Number of processes; up to 1 works in this process.
     what, unit
@@ -57,41 +74,58 @@ def parallel_map(
         Number of tasks, where `tasks` has no length.
     progress
         Show the bar, with the name of the task that was done last and the estimated time left.
+    on_result
+        Called in this process with every result as soon as it is there.
+
+    Raises
+    ------
+    ConfigError
+        If a process dies, for instance because memory runs out; names its task.
     """
     n = len(tasks) if isinstance(tasks, Sized) else total
     results: dict[int, R] = {}
     with progress_bar(total=n, desc=what, unit=unit, disable=not progress) as bar:
-        for at, task, result in _run(function, tasks, workers if n is None or n > 1 else 1):
+        for at, task, result in _run(function, tasks, label, workers if n is None or n > 1 else 1):
             results[at] = result
+            if on_result is not None:
+                on_result(result)
             bar.set_postfix_str(label(task), refresh=False)
             bar.update()
     return [results[at] for at in range(len(results))]
 
 
-def _run(function: Callable[[T], R], tasks: Iterable[T], workers: int) -> Iterator[tuple[int, T, R]]:
+def _run(
+    function: Callable[[T], R], tasks: Iterable[T], label: Callable[[T], str], workers: int
+) -> Iterator[tuple[int, T, R]]:
     if workers <= 1:
         yield from ((at, task, _on_one_thread(function, task)) for at, task in enumerate(tasks))
         return
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        running: dict[Future[R], tuple[int, T]] = {}
-        try:
-            for at, task in enumerate(tasks):
-                running[pool.submit(_on_one_thread, function, task)] = at, task
-                ready = [future for future in running if future.done()]
-                if len(running) - len(ready) > 2 * workers:  # tasks that are made one by one do not pile up
-                    ready = list(wait(running, return_when=FIRST_COMPLETED).done)
-                yield from _finished(running, ready)
-            while running:
-                yield from _finished(running, wait(running, return_when=FIRST_COMPLETED).done)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    ahead = 1 if isinstance(tasks, Sized) else 2  # what is made one by one is sent before it is needed
+    todo, more = enumerate(tasks), True
+    with crew() as team:
+        while more or any(worker.sent for worker in team):
+            room = more and (len(team) < workers or any(len(worker.sent) < ahead for worker in team))
+            if room and (made := next(todo, None)) is not None:
+                _least_busy(team, function, workers).send(*made)
+            else:
+                more = more and not room
+            for worker in ready(team, 0 if room else None):
+                yield _take(worker, label)
 
 
-def _finished(running: dict[Future[R], tuple[int, T]], futures: Iterable[Future[R]]) -> Iterator[tuple[int, T, R]]:
-    for future in futures:
-        at, task = running.pop(future)
-        yield at, task, future.result()
+def _least_busy(team: list[Worker], function: Callable[[T], R], workers: int) -> Worker:
+    if len(team) < workers and all(worker.sent for worker in team):
+        team.append(Worker(partial(_on_one_thread, function)))
+    return min(team, key=lambda worker: len(worker.sent))
+
+
+def _take(worker: Worker, label: Callable[[Any], str]) -> tuple[int, Any, Any]:
+    at, task = worker.sent[0]
+    try:
+        return at, task, worker.take()
+    except (EOFError, ConnectionError):
+        died = death(worker, label(task))
+    raise died
 
 
 def _on_one_thread(function: Callable[[T], R], task: T) -> R:
@@ -101,5 +135,13 @@ def _on_one_thread(function: Callable[[T], R], task: T) -> R:
 
 def in_fresh_process(function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
     """Call a function of a module in a new process and return its result: nothing is warm, and memory is its own."""
-    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
-        return pool.submit(function, *args, **kwargs).result()
+    with crew() as team:
+        team.append(Worker(_called))
+        team[0].send(0, partial(function, *args, **kwargs))
+        ready(team, None)
+        result: R = _take(team[0], lambda _: getattr(function, "__name__", "a function"))[2]
+    return result
+
+
+def _called(call: Callable[[], R]) -> R:
+    return call()

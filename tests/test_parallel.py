@@ -2,10 +2,12 @@ from __future__ import annotations
 
 import os
 
+import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from csm._parallel import in_fresh_process, parallel_map
+from csm._parallel import in_fresh_process, n_processes, parallel_map
+from csm.errors import ConfigError
 
 
 def square(x: int) -> int:
@@ -49,3 +51,24 @@ def test_tasks_may_be_made_one_by_one(workers):
 def test_a_fresh_process_is_another_one():
     process, _ = in_fresh_process(process_and_threads, 0)
     assert process != os.getpid()
+
+
+@pytest.mark.parametrize("workers", [0, 2])
+def test_results_are_handed_out_as_they_come(workers):
+    found = []
+    with pytest.raises(ValueError, match="negative"):
+        parallel_map(square, iter([3, 1, -2]), str, workers, what="square", unit="number", on_result=found.append)
+    assert set(found) <= {9, 1}
+    if workers == 0:
+        assert found == [9, 1]
+
+
+@pytest.mark.parametrize("workers", [-1, 1.5, True, "abc", "2", [2]])
+def test_a_number_of_workers_that_is_none_is_refused(workers):
+    with pytest.raises(ConfigError, match=r"^workers=.*wanted a whole number of processes"):
+        n_processes(workers, 5)
+
+
+@pytest.mark.parametrize("workers", [0, 3, np.int64(3)])
+def test_a_number_of_workers_is_taken_as_it_is(workers):
+    assert n_processes(workers, 5) == workers

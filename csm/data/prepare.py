@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from csm._parallel import n_processes, parallel_map
+from csm._signals import saying
 from csm._types import Arrays, Float32Array, FloatArray
 from csm.data.shapes import ShapeSet
 from csm.data.store import Store
@@ -187,14 +188,35 @@ def prepare(
     -------
     Summary
         Failures are listed there, not raised.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        When it is stopped by Ctrl-C or, within `csm._signals.terminable`, by SIGTERM; says what is kept.
     """
     begun = time.perf_counter()
     one = partial(_prepare_one, recipes=tuple(recipes), root=str(store.root))
     count = n_processes(workers, len(jobs))
-    done = parallel_map(one, jobs, lambda job: job.label, count, what="prepare", unit="shape", progress=progress)
+    kept: list[str] = []
+    with saying(lambda: _what_is_kept(kept, len(jobs))):
+        done = parallel_map(
+            one,
+            jobs,
+            lambda job: job.label,
+            count,
+            what="prepare",
+            unit="shape",
+            progress=progress,
+            on_result=lambda result: kept.append(result[0]),
+        )
     states = [state for state, _ in done]
     failures = [(job.label, why) for job, (state, why) in zip(jobs, done, strict=True) if state == "failed"]
     return Summary(states.count("present"), states.count("made"), failures, time.perf_counter() - begun)
+
+
+def _what_is_kept(states: Sequence[str], n_jobs: int) -> str:
+    kept = len(states) - states.count("failed")
+    return f"{kept} of {n_jobs} shapes are in the store; run the same command again to go on"
 
 
 def _prepare_one(job: Job, recipes: Sequence[Recipe], root: str) -> tuple[str, str]:

@@ -7,14 +7,17 @@ from functools import cached_property
 
 import numpy as np
 
-from csm._types import FloatArray, IntArray
+from csm._types import BoolArray, FloatArray, IntArray
 from csm.errors import MeshError
-from csm.mesh.shape import Mesh
+from csm.mesh._ears import split_polygons
+from csm.mesh.shape import Mesh, real_numbers, require_in_range, whole_numbers
 
 
 @dataclass(frozen=True, eq=False)
 class PolygonMesh:
     """Vertices and faces of any number of corners; what a file holds before anything is decided about it.
+
+    Its arrays are read-only copies.
 
     Parameters
     ----------
@@ -30,7 +33,7 @@ class PolygonMesh:
     Raises
     ------
     MeshError
-        If the shapes do not fit or a face refers to a vertex that does not exist.
+        If the shapes do not fit, the numbers are of a wrong kind, or a face refers to a vertex that does not exist.
     """
 
     vertices: FloatArray
@@ -39,6 +42,22 @@ class PolygonMesh:
     name: str = "mesh"
     source: str = ""
     notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        vertices = real_numbers(self.vertices, f"{self.label}: vertices")
+        corners = whole_numbers(self.corners, f"{self.label}: faces")
+        sizes = whole_numbers(self.sizes, f"{self.label}: numbers of corners")
+        if vertices.ndim != 2 or vertices.shape[1] != 3:
+            raise MeshError(f"{self.label}: vertices have shape {vertices.shape}, wanted (N, 3)")
+        if corners.ndim != 1 or sizes.ndim != 1 or (sizes < 0).any() or sizes.sum() != len(corners):
+            raise MeshError(
+                f"{self.label}: corners have shape {corners.shape} and sizes {sizes.shape}, wanted one list of corners "
+                "and, for each face, how many of them are its own"
+            )
+        require_in_range(corners, sizes, len(vertices), self.label)
+        for key, array in (("vertices", vertices), ("corners", corners), ("sizes", sizes)):
+            array.setflags(write=False)
+            object.__setattr__(self, key, array)
 
     @classmethod
     def of(cls, mesh: Mesh) -> PolygonMesh:
@@ -50,6 +69,16 @@ class PolygonMesh:
     def label(self) -> str:
         """What messages call it: the file as it was given, else the name."""
         return self.source or self.name
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of vertices, N."""
+        return len(self.vertices)
+
+    @property
+    def n_faces(self) -> int:
+        """Number of faces, M."""
+        return len(self.sizes)
 
     @cached_property
     def starts(self) -> IntArray:
@@ -77,3 +106,66 @@ class PolygonMesh:
             )
         faces = self.corners.reshape(-1, 3)
         return Mesh(self.vertices, faces, self.name, source=self.source, notes=self.notes)
+
+    def triangulated(self) -> Triangulated:
+        """Return the mesh with its faces split into triangles; see `triangulated`."""
+        return triangulated(self)
+
+    def __repr__(self) -> str:
+        return f"PolygonMesh({self.name!r}, {self.n_vertices} vertices, {self.n_faces} faces)"
+
+
+@dataclass(frozen=True, eq=False)
+class Triangulated:
+    """A mesh whose polygons were split into triangles.
+
+    Parameters
+    ----------
+    mesh
+        The triangles, in the order of the polygons; vertices are the polygon mesh's, to the bit.
+    face_map
+        Shape (M,): the polygon that each triangle is a part of.
+    """
+
+    mesh: Mesh
+    face_map: IntArray
+
+
+def triangulated(polygons: PolygonMesh) -> Triangulated:
+    """Split every polygon into triangles between its own corners; triangles stay as they are.
+
+    A quad is split along the diagonal whose two triangles agree in orientation and, of these, along the shorter; a
+    larger polygon by cutting off ears in its mean plane, so that a flat polygon that does not cross itself keeps its
+    area, convex or not.  A corner that is the same vertex as the one before it is counted once.  Faces of fewer than
+    three corners are left out.  What was left out or could not be split cleanly is in the `notes` of the mesh.
+    """
+    corners, sizes, notes = polygons.corners, polygons.sizes, list(polygons.notes)
+    repeated = _repeats_its_neighbour(polygons) & np.repeat(sizes > 3, sizes)
+    if repeated.any():
+        owner = np.repeat(np.arange(len(sizes)), sizes)
+        touched = len(np.unique(owner[repeated]))
+        notes.append(f"{touched} polygons name a vertex twice in a row; it was counted once")
+        corners, sizes = corners[~repeated], np.bincount(owner[~repeated], minlength=len(sizes))
+    few = int((sizes < 3).sum())
+    if few:
+        notes.append(f"{few} faces have fewer than three corners and were left out")
+    faces, face_map, crossing = split_polygons(polygons.vertices, corners, sizes)
+    if len(crossing):
+        notes.append(
+            f"{len(crossing)} polygons, the first of them face {crossing[0]}, cannot be split cleanly because they "
+            "cross themselves; their triangles overlap"
+        )
+    mesh = Mesh(polygons.vertices, faces, polygons.name, source=polygons.source, notes=tuple(notes))
+    face_map.setflags(write=False)
+    return Triangulated(mesh, face_map)
+
+
+def _repeats_its_neighbour(polygons: PolygonMesh) -> BoolArray:
+    """Tell of each corner whether it is the same vertex as the one before it in its face, going round."""
+    if len(polygons.corners) == 0:
+        return np.zeros(0, dtype=bool)
+    before = np.arange(len(polygons.corners)) - 1
+    filled = polygons.sizes > 0
+    before[polygons.starts[filled]] = polygons.starts[filled] + polygons.sizes[filled] - 1
+    repeats: BoolArray = polygons.corners == polygons.corners[before]
+    return repeats

@@ -5,8 +5,10 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from csm._types import FloatArray, IntArray
 from csm.errors import MeshError
@@ -34,7 +36,8 @@ class Mesh:
     Raises
     ------
     MeshError
-        If the arrays do not have these shapes or a face refers to a vertex that does not exist.
+        If the arrays do not have these shapes, are not real numbers, faces are not whole numbers, or a face refers to
+        a vertex that does not exist.
     """
 
     vertices: FloatArray
@@ -45,15 +48,15 @@ class Mesh:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        vertices = np.array(self.vertices, dtype=np.float64, order="C")
-        faces = np.array(self.faces, dtype=np.int64, order="C")
+        vertices = real_numbers(self.vertices, f"{self.label}: vertices")
+        faces = whole_numbers(self.faces, f"{self.label}: faces")
         if vertices.ndim != 2 or vertices.shape[1] != 3:
             raise MeshError(f"{self.label}: vertices have shape {vertices.shape}, wanted (N, 3)")
         if faces.ndim != 2 or faces.shape[1] != 3:
             raise MeshError(
                 f"{self.label}: faces have shape {faces.shape}, wanted (M, 3): csm reads triangle meshes only"
             )
-        _require_indices_in_range(faces, len(vertices), self.label)
+        require_in_range(faces.ravel(), np.full(len(faces), 3), len(vertices), self.label)
         for key, array in (("vertices", vertices), ("faces", faces)):
             array.setflags(write=False)
             object.__setattr__(self, key, array)
@@ -131,12 +134,66 @@ class Mesh:
         return f"Mesh({self.name!r}, {self.n_vertices} vertices, {self.n_faces} faces)"
 
 
-def _require_indices_in_range(faces: IntArray, n: int, name: str) -> None:
-    outside = np.flatnonzero(((faces < 0) | (faces >= n)).any(axis=1))
+def real_numbers(values: ArrayLike, what: str) -> FloatArray:
+    """Return a float64 copy of what are real numbers already; nothing is cut off to make it fit.
+
+    Raises
+    ------
+    MeshError
+        If they are complex, truth values, text or objects, or do not form an array; `what` begins the message.
+    """
+    array = _as_array(values, what)
+    if array.dtype.kind not in "iuf":
+        raise MeshError(f"{what} are {_kind_in_words(array)}, wanted real numbers")
+    with np.errstate(over="ignore"):
+        return np.array(array, dtype=np.float64, order="C")
+
+
+def whole_numbers(values: ArrayLike, what: str) -> IntArray:
+    """Return an int64 copy of whole numbers; floating-point ones count if every one of them is whole.
+
+    Raises
+    ------
+    MeshError
+        If they are of another kind or one is not whole; `what` begins the message.
+    """
+    array = _as_array(values, what)
+    if array.dtype.kind not in "iuf":
+        raise MeshError(f"{what} are {_kind_in_words(array)}, wanted whole numbers")
+    if array.dtype.kind == "f":
+        odd = array[~(np.abs(array) < 2.0**53) | (array != np.round(array))]
+        if odd.size:
+            raise MeshError(f"{what} hold {odd.flat[0]}, wanted whole numbers: a vertex number has no fraction")
+    elif array.dtype == np.uint64:
+        array = np.minimum(array, np.uint64(2**63 - 1))
+    return np.array(array, dtype=np.int64, order="C")
+
+
+def _as_array(values: ArrayLike, what: str) -> NDArray[Any]:
+    try:
+        return np.asarray(values)
+    except (ValueError, TypeError) as error:
+        raise MeshError(f"{what} form no array of numbers ({error})") from None
+
+
+def _kind_in_words(array: NDArray[Any]) -> str:
+    words = {"c": "complex (the imaginary part would be lost)", "b": "truth values", "O": "Python objects"}
+    return words.get(array.dtype.kind, f"of the kind {array.dtype}")
+
+
+def require_in_range(corners: IntArray, sizes: IntArray, n: int, label: str) -> None:
+    """Refuse faces, given one after the other, that refer to a vertex outside of 0..n-1.
+
+    Raises
+    ------
+    MeshError
+        Naming the first such face; a 1-based numbering is recognised and said.
+    """
+    outside = np.flatnonzero((corners < 0) | (corners >= n))
     if outside.size == 0:
         return
-    row = faces[outside[0]]
-    bad = int(row[(row < 0) | (row >= n)][0])
-    one_based = faces.min() == 1 and faces.max() == n
+    face = int(np.searchsorted(np.cumsum(sizes), outside[0], side="right"))
+    one_based = corners.min() == 1 and corners.max() == n
     hint = "; the indices run from 1, so the file is 1-based: subtract 1" if one_based else ""
-    raise MeshError(f"{name}: face {outside[0]} refers to vertex {bad}, but there are {n} (0..{n - 1}){hint}")
+    there = f"there are {n} (0..{n - 1})" if n else "there is none"
+    raise MeshError(f"{label}: face {face} refers to vertex {corners[outside[0]]}, but {there}{hint}")

@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
+from csm._signals import Stopped, Terminated
 from csm._types import Arrays
 from csm.data.prepare import Job, Recipe, features_of, is_prepared, prepare, prepare_mesh, shared_operators
 from csm.data.registry import recognise
@@ -101,6 +102,28 @@ def test_an_interrupted_run_goes_on_where_it_was(toys, tmp_path):
     prepare(jobs(toys)[:3], [RECIPE], store, workers=0, progress=False)
     summary = prepare(jobs(toys), [RECIPE], store, workers=0, progress=False)
     assert (summary.made, summary.present) == (1, 3)
+
+
+class Stopping:
+    """A set that is stopped by the user when one of its shapes is read."""
+
+    def __init__(self, shapes, at: str, stop: type[KeyboardInterrupt]) -> None:
+        self.name, self.names, self._shapes, self._at, self._stop = shapes.name, shapes.names, shapes, at, stop
+
+    def load(self, name: str):
+        if name == self._at:
+            raise self._stop
+        return self._shapes.load(name)
+
+
+@pytest.mark.parametrize("stop", [KeyboardInterrupt, Terminated])
+def test_a_stopped_run_says_what_is_kept_and_how_to_go_on(toys, tmp_path, stop):
+    store = Store(tmp_path / "store")
+    with pytest.raises(Stopped if stop is KeyboardInterrupt else stop) as caught:
+        prepare(jobs(Stopping(toys, "toy2", stop)), [RECIPE], store, workers=0, progress=False)
+    assert str(caught.value) == "2 of 4 shapes are in the store; run the same command again to go on"
+    summary = prepare(jobs(toys), [RECIPE], store, workers=0, progress=False)
+    assert (summary.made, summary.present) == (2, 2)
 
 
 def test_one_bad_shape_does_not_stop_the_others_and_is_named(toys, tmp_path):

@@ -80,3 +80,28 @@ def test_the_digest_is_of_the_geometry_alone():
 def test_arrays_that_are_no_mesh_are_refused(vertices, faces, message):
     with pytest.raises(MeshError, match=message):
         Mesh(vertices, faces, "bad")
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "message"),
+    [
+        (TRIANGLE, [[0, 1, 1.5]], "faces hold 1.5, wanted whole numbers"),
+        (TRIANGLE, [[0, 1, np.nan]], "faces hold nan, wanted whole numbers"),
+        (TRIANGLE, [[False, True, True]], "faces are truth values"),
+        (TRIANGLE, np.array([[0, 1, 2j]]), "faces are complex"),
+        (TRIANGLE, [["0", "1", "2"]], "faces are of the kind <U1"),
+        (TRIANGLE, np.array([[0, 1, 2**64 - 1]], np.uint64), "face 0 refers to vertex 9223372036854775807"),
+        (TRIANGLE * 1j, [[0, 1, 2]], r"vertices are complex \(the imaginary part would be lost\)"),
+        (TRIANGLE > 0, [[0, 1, 2]], "vertices are truth values"),
+        (TRIANGLE.astype(object), [[0, 1, 2]], "vertices are Python objects"),
+        ([[0, 0, 0], [1, 0]], [[0, 1, 2]], "vertices form no array of numbers"),
+    ],
+)
+def test_numbers_of_another_kind_are_refused_not_rounded(vertices, faces, message):
+    with pytest.raises(MeshError, match=f"^thing: {message}"):
+        Mesh(vertices, faces, "thing")
+
+
+def test_whole_numbers_of_any_type_are_faces():
+    for kind in (np.uint8, np.uint64, np.float32, np.float64):
+        assert Mesh(TRIANGLE, np.array([[0, 2, 1]], kind)).faces.tolist() == [[0, 2, 1]]

@@ -15,7 +15,7 @@ from csm.mesh.io.files import (
     unpacked,
 )
 from csm.mesh.io.maps import read_labels, read_names, read_pairs, read_vts, write_map
-from csm.mesh.io.meshes import READABLE, WRITABLE, count_vertices, read_mesh, write_mesh
+from csm.mesh.io.meshes import READABLE, WRITABLE, count_vertices, read_mesh, read_polygons, write_mesh
 
 __all__ = [
     "READABLE",
@@ -31,6 +31,7 @@ __all__ = [
     "read_mesh",
     "read_names",
     "read_pairs",
+    "read_polygons",
     "read_vts",
     "unpack",
     "unpacked",

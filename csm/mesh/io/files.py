@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from csm.errors import DataError
+from csm.mesh.io.guard import refusals, require_regular
 
 
 def read_bytes(path: str | os.PathLike[str]) -> bytes:
@@ -22,23 +23,18 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
     Raises
     ------
     DataError
-        If there is no such file or it may not be read.
+        If there is no such file, it may not be read, or it is something that does not end: a pipe or a device.
     """
-    try:
-        return Path(path).read_bytes()
-    except FileNotFoundError:
-        raise DataError(f"{path}: there is no such file") from None
-    except IsADirectoryError:
-        raise DataError(f"{path}: this is a folder, wanted a file") from None
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror})") from error
+    return _first_bytes(path, require_regular(path))
 
 
-def read_bytes_of_head(path: Path, size: int = 4096) -> bytes:
+def read_bytes_of_head(path: str | os.PathLike[str], size: int = 1 << 16) -> bytes:
     """Return the first bytes of a file, with the same errors as `read_bytes`."""
-    if not path.is_file():
-        return read_bytes(path)
-    with path.open("rb") as file:
+    return _first_bytes(path, min(size, require_regular(path)))
+
+
+def _first_bytes(path: str | os.PathLike[str], size: int) -> bytes:
+    with refusals(path), Path(path).open("rb") as file:
         return file.read(size)
 
 

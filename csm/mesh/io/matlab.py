@@ -18,7 +18,7 @@ from csm.mesh.io.raw import RawMesh
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
-def parse_mat(data: bytes) -> RawMesh:
+def parse_mat(data: bytes, choose: object = None) -> RawMesh:
     """Read the one shape of a .mat file: `TRIV` with `X`, `Y`, `Z` or with `VERT`, at the top or in structs.
 
     The struct's name plays no part (`shape`, `surface`, `S.surface`, `M` are in use).  `TRIV` is 1-based by MATLAB's
@@ -39,7 +39,7 @@ def parse_mat(data: bytes) -> RawMesh:
         raise MeshError(f"{name}.TRIV holds numbers that are not whole")
     faces = faces.astype(np.int64)
     base = 0 if (faces == 0).any() else 1
-    return RawMesh(_vertices(name, fields), faces - base)
+    return RawMesh.of(_vertices(name, fields), faces - base)
 
 
 def load_mat(data: bytes) -> dict[str, Any]:

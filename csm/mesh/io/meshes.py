@@ -1,61 +1,49 @@
-"""`read_mesh` and `write_mesh` for all mesh formats."""
+"""`read_mesh`, `read_polygons` and `write_mesh` for all mesh formats."""
 
 from __future__ import annotations
 
-import io
 import os
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from csm.errors import DataError, MeshError
 from csm.mesh.io.files import atomic_path, read_bytes, read_bytes_of_head
+from csm.mesh.io.guard import inflate, parsing
 from csm.mesh.io.matlab import parse_mat
+from csm.mesh.io.npz import parse_npz
 from csm.mesh.io.obj import format_obj, parse_obj
 from csm.mesh.io.off import count_off, format_off, parse_off
 from csm.mesh.io.ply import counts_ply, format_ply, parse_ply
 from csm.mesh.io.raw import RawMesh
 from csm.mesh.io.stl import parse_stl
+from csm.mesh.polygons import PolygonMesh
 from csm.mesh.shape import Mesh
 
+Choice: TypeAlias = "int | Literal['all'] | None"
+"""Which shape of a file with several: its number from 0, "all" of them joined, or None, if there has to be one only."""
 
-def parse_npz(data: bytes) -> RawMesh:
-    """Read the arrays `vertices` (N, 3) and `faces` (M, 3), 0-based, of a NumPy archive; pickles are refused."""
-    if not data.startswith(b"PK"):
-        raise MeshError("this is no NumPy archive")
-    with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-        if not {"vertices", "faces"} <= set(archive.files):
-            raise MeshError(f"wanted the arrays 'vertices' and 'faces', found {', '.join(archive.files) or 'none'}")
-        try:
-            return RawMesh(archive["vertices"], archive["faces"])
-        except ValueError as error:
-            raise MeshError("'vertices' or 'faces' holds Python objects, wanted numbers") from error
-
-
-_PARSERS: Mapping[str, Callable[[bytes], RawMesh]] = MappingProxyType(
-    {
-        ".off": parse_off,
-        ".ply": parse_ply,
-        ".obj": parse_obj,
-        ".stl": parse_stl,
-        ".npz": parse_npz,
-        ".mat": parse_mat,
-    }
+_ONE: Mapping[str, Callable[[bytes], RawMesh]] = MappingProxyType(
+    {".off": parse_off, ".ply": parse_ply, ".obj": parse_obj, ".stl": parse_stl, ".npz": parse_npz}
 )
+_SEVERAL: Mapping[str, Callable[[bytes, Choice], RawMesh]] = MappingProxyType({".mat": parse_mat})
 
-READABLE: tuple[str, ...] = tuple(_PARSERS)
+READABLE: tuple[str, ...] = (*_ONE, *_SEVERAL)
+"""Suffixes of the formats that are read; each may be followed by .gz."""
+
 WRITABLE: tuple[str, ...] = (".off", ".ply", ".obj")
 
 
-def read_mesh(path: str | os.PathLike[str], name: str | None = None) -> Mesh:
-    """Read a triangle mesh; the suffix (.off .ply .obj .stl .npz .mat) says the format.
+def read_mesh(path: str | os.PathLike[str], name: str | None = None, choose: Choice = None) -> Mesh:
+    """Read a triangle mesh; the suffix (.off .ply .obj .stl .npz .mat, each also .gz) says the format.
 
     Vertex order and number are the file's: nothing is merged, split, dropped or scaled.  The triangles of an
-    .stl file share no vertices and are not joined.
+    .stl file share no vertices and are not joined.  What the reader noticed is in the mesh's `notes`.
 
     Parameters
     ----------
@@ -63,6 +51,8 @@ def read_mesh(path: str | os.PathLike[str], name: str | None = None) -> Mesh:
         The file.
     name
         Name of the mesh; without it the file name without suffix.
+    choose
+        Which shape of a file that holds several, see `Choice`.
 
     Raises
     ------
@@ -70,43 +60,82 @@ def read_mesh(path: str | os.PathLike[str], name: str | None = None) -> Mesh:
         If the file is missing, damaged, of another format, not a triangle mesh, or a face refers to a vertex that
         does not exist (a 1-based file is named as such).
     """
-    path = Path(path)
-    parse = _PARSERS.get(path.suffix.lower())
-    if parse is None:
-        raise MeshError(
-            f"{path}: csm does not read {path.suffix or 'files without a suffix'}; wanted {_list(READABLE)}"
-        )
-    raw = _parsed(path, parse)
-    if raw.faces.dtype.kind not in "iu":
-        raise MeshError(f"{path}: the faces are of type {raw.faces.dtype}, wanted integers")
-    return Mesh(raw.vertices, raw.faces, name or path.stem, source=str(path))
+    return read_polygons(path, name, choose).triangles()
 
 
-def _parsed(path: Path, parse: Callable[[bytes], RawMesh]) -> RawMesh:
+def read_polygons(path: str | os.PathLike[str], name: str | None = None, choose: Choice = None) -> PolygonMesh:
+    """Read a mesh whose faces may have any number of corners, as it is in the file; see `read_mesh`.
+
+    Raises
+    ------
+    MeshError
+        As `read_mesh`, but for the corners of the faces.
+    """
+    given = os.fspath(path)
+    suffix = _format(given)
     try:
-        data = read_bytes(path)
+        data = read_bytes(given)
     except DataError as error:
         raise MeshError(str(error)) from error.__cause__
     if not data:
-        raise MeshError(f"{path}: the file is empty")
-    try:
-        return parse(data)
-    except MeshError as error:
-        raise MeshError(f"{path}: {error}") from error.__cause__
-    except Exception as error:  # a damaged file makes the libraries raise whatever they trip over
-        raise MeshError(f"{path}: this is no {path.suffix} file, or it is damaged or cut short ({error})") from error
+        raise MeshError(f"{given}: the file is empty")
+    with parsing(given, suffix):
+        raw = _parsed(data, given, suffix, choose)
+    return PolygonMesh(raw.vertices, raw.corners, raw.sizes, name or _stem(given), given, raw.notes)
 
 
-def count_vertices(path: Path) -> int:
-    """Return the number of vertices of a mesh file, from the header alone for .off and .ply."""
+def _format(path: str) -> str:
+    """Return the suffix that says the format, in lower case."""
+    file = Path(path[:-3] if path.lower().endswith(".gz") else path)
+    if file.suffix.lower() not in READABLE:
+        raise MeshError(
+            f"{path}: csm does not read {file.suffix or 'files without a suffix'}; wanted {_list(READABLE)}, "
+            "each also as .gz"
+        )
+    return file.suffix.lower()
+
+
+def _stem(path: str) -> str:
+    return Path(path[:-3] if path.lower().endswith(".gz") else path).stem
+
+
+def _parsed(data: bytes, path: str, suffix: str, choose: Choice) -> RawMesh:
+    notes: tuple[str, ...] = ()
+    if path.lower().endswith(".gz"):
+        data, left = inflate(data)
+        notes = (f"{left} bytes follow the compressed data; they were not read",) if left else ()
+    raw = _parser(suffix, choose)(data)
+    return replace(raw, notes=notes + raw.notes)
+
+
+def _parser(suffix: str, choose: Choice) -> Callable[[bytes], RawMesh]:
+    if suffix in _SEVERAL:
+        parse = _SEVERAL[suffix]
+        return lambda data: parse(data, choose)
+    if choose not in (None, 0, "all"):
+        raise MeshError(f"a {suffix} file holds one shape, so there is no choose={choose!r}")
+    return _ONE[suffix]
+
+
+def count_vertices(path: str | os.PathLike[str]) -> int:
+    """Return the number of vertices of a mesh file, from the header alone for .off and .ply.
+
+    Raises
+    ------
+    MeshError
+        As `read_polygons`.
+    """
+    given = os.fspath(path)
     heads: dict[str, Callable[[bytes], int]] = {".off": count_off, ".ply": lambda data: counts_ply(data)[0]}
-    count = heads.get(path.suffix.lower())
+    count = heads.get(Path(given).suffix.lower())
     if count is None:
-        return read_mesh(path).n_vertices
+        return read_polygons(given, choose=None).n_vertices
     try:
-        return count(read_bytes_of_head(path))
-    except MeshError as error:
-        raise MeshError(f"{path}: {error}") from None
+        head = read_bytes_of_head(given)
+    except DataError as error:
+        raise MeshError(str(error)) from error.__cause__
+    with parsing(given, Path(given).suffix.lower()):
+        return count(head)
 
 
 def write_mesh(path: str | os.PathLike[str], mesh: Mesh, colors: NDArray[Any] | None = None) -> None:
@@ -125,9 +154,10 @@ def write_mesh(path: str | os.PathLike[str], mesh: Mesh, colors: NDArray[Any] | 
     ------
     MeshError
         If the suffix cannot be written or the colours do not fit.
+    DataError
+        If the file cannot be written there.
     """
-    path = Path(path)
-    suffix = path.suffix.lower()
+    suffix = Path(path).suffix.lower()
     if suffix not in WRITABLE:
         raise MeshError(f"{path}: csm does not write {suffix or 'files without a suffix'}; wanted {_list(WRITABLE)}")
     if colors is not None:

@@ -2,50 +2,80 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from csm.errors import MeshError
-from csm.mesh.io.raw import RawMesh, coordinates, decode, polygon_error
+from csm.mesh.io.raw import RawMesh, coordinates, decode
 from csm.mesh.shape import Mesh
 
 
 def parse_obj(data: bytes) -> RawMesh:
-    """Read the `v` and `f` lines of an OBJ file.
+    r"""Read the `v` and `f` lines of an OBJ file; faces may have any number of corners.
 
-    A face corner may be `v`, `v/vt`, `v//vn` or `v/vt/vn`; negative numbers count back from the vertices read so far.
-    Normals, texture coordinates, groups, materials, lines and points are skipped.
+    A face corner may be `v`, `v/vt`, `v//vn` or `v/vt/vn`; negative numbers count back from the vertices read so far;
+    a `\` at a line's end continues it.  Normals, texture coordinates, groups, materials, lines and points are skipped.
+    Vertices that no face uses are kept and noted, since a file that was cut between two lines has such.
 
     Raises
     ------
     MeshError
-        If there is no vertex, a line cannot be read, a face is not a triangle or uses vertex 0 (OBJ counts from 1).
+        If there is no vertex, a line cannot be read, the file ends in the middle of a face, or a face refers to vertex
+        0 (OBJ counts from 1) or to one that does not exist.
     """
     vertices: list[list[str]] = []
-    faces: list[list[int]] = []
-    for line in decode(data).replace("\\\r\n", " ").replace("\\\n", " ").splitlines():
+    corners: list[int] = []
+    sizes: list[int] = []
+    last: list[str] = []
+    for line in re.sub(r"\\(\r\n|\n|\r)", " ", decode(data)).splitlines():
         words = line.partition("#")[0].split()
         if words and words[0] == "v":
             vertices.append(words[1:])
         elif words and words[0] == "f":
-            faces.append(_triangle(words[1:], len(faces), len(vertices)))
+            corners += _corners(words[1:], len(sizes), len(vertices))
+            sizes.append(len(words) - 1)
+        last = words or last
     if not vertices:
         raise MeshError("there is no line 'v x y z', so this is no OBJ mesh")
-    return RawMesh(coordinates(vertices), np.array(faces, dtype=np.int64).reshape(len(faces), 3))
+    if last and last[0] == "f" and len(last) < 4:
+        raise MeshError(f"the file ends in the middle of face {len(sizes) - 1} ({' '.join(last)!r}): it was cut short")
+    points = coordinates(vertices)
+    numbers = np.array(corners, dtype=np.int64)
+    _require_existing(numbers, np.array(sizes, dtype=np.int64), len(points))
+    return RawMesh(points, numbers, np.array(sizes, dtype=np.int64), _notes(numbers, len(points)))
 
 
-def _triangle(words: list[str], face: int, n_so_far: int) -> list[int]:
-    if len(words) != 3:
-        raise polygon_error(face, len(words))
+def _corners(words: list[str], face: int, n_so_far: int) -> list[int]:
     try:
         corners = [int(word.partition("/")[0]) for word in words]
     except ValueError:
-        raise MeshError(f"face {face} is 'f {' '.join(words)}', wanted three vertex numbers") from None
+        raise MeshError(f"face {face} is 'f {' '.join(words)[:80]}', wanted vertex numbers") from None
     for corner in corners:
         if corner == 0:
             raise MeshError(f"face {face} refers to vertex 0, but OBJ counts vertices from 1")
         if corner < -n_so_far:
             raise MeshError(f"face {face} refers to vertex {corner} (counted back), but only {n_so_far} precede it")
+        if corner > 2**62:
+            raise MeshError(f"face {face} refers to vertex {corner}, which cannot be")
     return [corner - 1 if corner > 0 else n_so_far + corner for corner in corners]
+
+
+def _require_existing(corners: np.ndarray, sizes: np.ndarray, n_vertices: int) -> None:
+    outside = np.flatnonzero(corners >= n_vertices)
+    if outside.size:
+        face = int(np.searchsorted(np.cumsum(sizes), outside[0], side="right"))
+        raise MeshError(
+            f"face {face} refers to vertex {corners[outside[0]] + 1}, but there are {n_vertices} (1..{n_vertices}): "
+            "vertices are missing from the file"
+        )
+
+
+def _notes(corners: np.ndarray, n_vertices: int) -> tuple[str, ...]:
+    unused = n_vertices - len(np.unique(corners))
+    if not unused or not len(corners):
+        return ()
+    return (f"{unused} of {n_vertices} vertices belong to no face; if that is unexpected, the file was cut short",)
 
 
 def format_obj(mesh: Mesh) -> bytes:

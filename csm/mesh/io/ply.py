@@ -34,7 +34,7 @@ def parse_ply(data: bytes) -> RawMesh:
             f"the header announces {n_faces} faces, but they are {len(faces)} triangles: either the file is cut short "
             "or has faces of more than three corners; csm reads triangle meshes only, so triangulate it first"
         )
-    return RawMesh(vertices, faces)
+    return RawMesh.of(vertices, faces)
 
 
 def counts_ply(data: bytes) -> tuple[int, int]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import codecs
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,15 +14,47 @@ from csm._types import FloatArray
 from csm.errors import MeshError
 
 
-class RawMesh(NamedTuple):
-    """Arrays as a file holds them, faces already 0-based, not yet checked against each other."""
+@dataclass(frozen=True, eq=False)
+class RawMesh:
+    """Arrays as a file holds them, faces already 0-based, not yet checked against each other.
+
+    Parameters
+    ----------
+    vertices
+        Shape (N, 3).
+    corners
+        The vertices of all faces, one face after the other.
+    sizes
+        Shape (M,): how many corners each face has.
+    notes
+        What the parser noticed, one sentence each.
+    """
 
     vertices: NDArray[Any]
-    faces: NDArray[Any]
+    corners: NDArray[Any]
+    sizes: NDArray[Any]
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, vertices: NDArray[Any], faces: NDArray[Any], notes: tuple[str, ...] = ()) -> RawMesh:
+        """Return a mesh whose faces, shape (M, n), have the same number n of corners each."""
+        return cls(vertices, faces.reshape(-1), np.full(len(faces), faces.shape[1], dtype=np.int64), notes)
+
+    @property
+    def faces(self) -> NDArray[Any]:
+        """The faces of a mesh whose faces have the same number of corners each, shape (M, n)."""
+        return self.corners.reshape(len(self.sizes), int(self.sizes[0]) if len(self.sizes) else 3)
 
 
 def decode(data: bytes) -> str:
-    """Decode a text format; Latin-1 accepts every byte, and only comments are ever outside of ASCII."""
+    """Decode a text format, without its byte-order mark.
+
+    Latin-1 accepts every byte, and only comments and names are ever outside of ASCII.  A text that begins with the
+    mark of UTF-16 is decoded as such.
+    """
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return data.decode("utf-16", errors="replace")
+    data = data.removeprefix(codecs.BOM_UTF8)
     if b"\0" in data:
         raise MeshError("this is a binary or damaged file, wanted text")
     return data.decode("latin-1")
@@ -39,16 +73,8 @@ def coordinates(rows: Sequence[Sequence[str]]) -> FloatArray:
     except ValueError:
         for i, row in enumerate(rows):
             if len(row) < 3 or not all(is_number(word) for word in row[:3]):
-                raise MeshError(f"vertex {i} is {' '.join(row)!r}, wanted three numbers") from None
+                raise MeshError(f"vertex {i} is {' '.join(row)[:80]!r}, wanted three numbers") from None
         raise
-
-
-def polygon_error(face: int, n_corners: int) -> MeshError:
-    """Return the error for a face that is not a triangle."""
-    return MeshError(
-        f"face {face} has {n_corners} corners, but csm reads triangle meshes only; triangulate the file first "
-        "(in MeshLab: Turn into Pure-Triangular mesh)"
-    )
 
 
 def is_number(word: str) -> bool:

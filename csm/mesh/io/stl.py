@@ -29,4 +29,4 @@ def parse_stl(data: bytes) -> RawMesh:
     vertices, faces = np.asarray(loaded["vertices"]), np.asarray(loaded["faces"])
     if len(faces) == 0 or len(vertices) != 3 * len(faces):
         raise MeshError(f"found {len(vertices)} corners of {len(faces)} triangles: an empty or damaged STL file")
-    return RawMesh(vertices, faces)
+    return RawMesh.of(vertices, faces)

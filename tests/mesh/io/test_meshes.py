@@ -1,3 +1,5 @@
+import gzip
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -5,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from csm.errors import MeshError
-from csm.mesh.io import READABLE, WRITABLE, count_vertices, read_mesh, write_mesh
+from csm.mesh.io import READABLE, WRITABLE, count_vertices, read_mesh, read_polygons, write_mesh
 from csm.mesh.shape import Mesh
 from tests.shapes import blob, sphere
 
@@ -36,24 +38,6 @@ def test_name_is_the_stem_unless_given(tmp_path):
     assert read_mesh(str(tmp_path / "tr_reg_000.ply"), "other").name == "other"
 
 
-def test_npz(tmp_path):
-    mesh = blob(1)
-    np.savez(tmp_path / "a.npz", vertices=mesh.vertices, faces=mesh.faces.astype(np.int32))
-    assert read_mesh(tmp_path / "a.npz").digest == mesh.digest
-
-
-def test_npz_with_other_keys_or_pickles_is_refused(tmp_path):
-    np.savez(tmp_path / "a.npz", verts=np.eye(3), faces=np.eye(3))
-    with pytest.raises(MeshError, match=r"a\.npz: wanted the arrays.*found verts, faces"):
-        read_mesh(tmp_path / "a.npz")
-    np.savez(tmp_path / "b.npz", vertices=np.array([{}], dtype=object), faces=np.eye(3))
-    with pytest.raises(MeshError, match=r"b\.npz.*Python objects"):
-        read_mesh(tmp_path / "b.npz")
-    np.savez(tmp_path / "c.npz", vertices=np.eye(3), faces=np.array([[0.0, 1, 2]]))
-    with pytest.raises(MeshError, match=r"c\.npz.*float64, wanted integers"):
-        read_mesh(tmp_path / "c.npz")
-
-
 def test_a_one_based_file_is_named_as_such(tmp_path):
     (tmp_path / "a.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 1 2 3\n")
     with pytest.raises(MeshError, match=r"a\.off: face 0 refers to vertex 3.*1-based"):
@@ -66,10 +50,55 @@ def test_unknown_missing_and_empty_files(tmp_path):
         read_mesh(tmp_path / "a.off")
     with pytest.raises(MeshError, match=r"b\.off: there is no such file"):
         read_mesh(tmp_path / "b.off")
-    with pytest.raises(MeshError, match=r"does not read \.gltf; wanted \.off, \.ply"):
-        read_mesh(tmp_path / "a.gltf")
+    with pytest.raises(MeshError, match=r"does not read \.fbx; wanted \.off, \.ply"):
+        read_mesh(tmp_path / "a.fbx")
     with pytest.raises(MeshError, match="without a suffix"):
         read_mesh(tmp_path / "a")
+
+
+def test_polygons_give_a_sentence_that_names_clean_and_the_file_as_given(tmp_path, monkeypatch):
+    (tmp_path / "a.off").write_text("OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(MeshError, match=r"^\./a\.off: face 0 has 4 corners.*`csm clean`"):
+        read_mesh("./a.off")
+    quad = read_polygons("./a.off")
+    assert (quad.source, quad.name, quad.sizes.tolist()) == ("./a.off", "a", [4])
+
+
+def test_source_and_notes_of_a_mesh(tmp_path):
+    (tmp_path / "a.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n9 9 9\n")
+    mesh = read_mesh(str(tmp_path / "a.off"))
+    assert mesh.source == str(tmp_path / "a.off")
+    assert mesh.notes == ("1 lines follow the last face; they were not read",)
+
+
+@pytest.mark.parametrize("suffix", WRITABLE)
+def test_gzipped_files_are_read_like_plain_ones(tmp_path, suffix):
+    write_mesh(tmp_path / f"a{suffix}", blob(1))
+    data = (tmp_path / f"a{suffix}").read_bytes()
+    (tmp_path / f"b{suffix}.GZ").write_bytes(gzip.compress(data[:99]) + gzip.compress(data[99:]) + b"rest")
+    mesh = read_mesh(tmp_path / f"b{suffix}.GZ")
+    assert mesh.digest == blob(1).digest
+    assert mesh.name == "b"
+    assert mesh.notes == ("4 bytes follow the compressed data; they were not read",)
+    assert count_vertices(tmp_path / f"b{suffix}.GZ") == mesh.n_vertices
+
+
+def test_a_damaged_or_cut_gz_is_named(tmp_path):
+    whole = gzip.compress(b"OFF\n0 0 0\n" * 100)
+    (tmp_path / "a.off.gz").write_bytes(whole[:-9])
+    with pytest.raises(MeshError, match=r"a\.off\.gz: the compressed data is cut short"):
+        read_mesh(tmp_path / "a.off.gz")
+    (tmp_path / "a.off.gz").write_bytes(b"OFF")
+    with pytest.raises(MeshError, match=r"a\.off\.gz: the compressed data is damaged"):
+        read_mesh(tmp_path / "a.off.gz")
+
+
+def test_there_is_no_choice_in_a_format_of_one_shape(tmp_path):
+    write_mesh(tmp_path / "a.off", blob(1))
+    assert read_mesh(tmp_path / "a.off", choose=0).digest == blob(1).digest
+    with pytest.raises(MeshError, match=r"a\.off: a \.off file holds one shape, so there is no choose=1"):
+        read_mesh(tmp_path / "a.off", choose=1)
 
 
 @pytest.mark.parametrize("suffix", READABLE)

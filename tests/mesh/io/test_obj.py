@@ -38,8 +38,9 @@ def test_unreferenced_and_repeated_vertices_stay():
 
 
 BROKEN = {
-    "quad": (POINTS + "f 1 2 3\nf 1 2 3 4\n", "face 1 has 4 corners"),
-    "two corners": (POINTS + "f 1 2\n", "face 0 has 2 corners"),
+    "cut in its last line": (POINTS + "f 1 2 3\nf 2 3 4\nf 4 1 ", "file ends in the middle of face 2 .*cut short"),
+    "empty last line": (POINTS + "f 1 2 3\nf\n", "file ends in the middle of face 1"),
+    "vertices missing": (POINTS + "f 1 2 3\nf 1 2 5\n", r"face 1 refers to vertex 5, but there are 4 \(1..4\)"),
     "zero": (POINTS + "f 0 1 2\n", "counts vertices from 1"),
     "too far back": (POINTS + "f -5 -1 -2\n", "only 4 precede"),
     "words": (POINTS + "f a b c\n", "face 0 is 'f a b c'"),
@@ -52,3 +53,22 @@ BROKEN = {
 def test_broken_files_say_what_is_wrong(text, message):
     with pytest.raises(MeshError, match=message):
         parse_obj(text.encode())
+
+
+def test_polygons_are_kept_with_their_corners():
+    raw = parse_obj((POINTS + "f 1 2 3\nf 1/1 2/1 3/1 4/1\nf 1 2\nf -1 -2 -3\n").encode())
+    assert raw.sizes.tolist() == [3, 4, 2, 3]
+    assert raw.corners.tolist() == [0, 1, 2, 0, 1, 2, 3, 0, 1, 3, 2, 1]
+
+
+def test_vertices_of_no_face_are_a_note_since_a_cut_file_has_them():
+    (note,) = parse_obj((POINTS + "f 1 2 3\n").encode()).notes
+    assert "1 of 4 vertices belong to no face" in note
+    assert parse_obj((POINTS + "f 1 2 3\nf 1 2 4\n").encode()).notes == ()
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_a_byte_order_mark_costs_no_vertex(encoding):
+    raw = parse_obj((POINTS + "f 1 3 2\nf 1 2 4\n").encode(encoding))
+    np.testing.assert_array_equal(raw.vertices, VERTICES)
+    np.testing.assert_array_equal(raw.faces, TRIANGLES)

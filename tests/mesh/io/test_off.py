@@ -55,16 +55,13 @@ BROKEN = {
     "other text": (b"hello world\n", "wanted 'OFF'"),
     "keyword alone": (b"OFF\n", "wanted 'OFF'"),
     "negative count": (b"OFF\n-4 4 6\n", "numbers of vertices"),
-    "quad": (f"OFF\n4 1 0\n{POINTS}4 0 1 2 3\n".encode(), "face 0 has 4 corners"),
-    "edge": (f"OFF\n4 1 0\n{POINTS}2 0 1\n".encode(), "face 0 has 2 corners"),
-    "later quad": (f"OFF\n4 3 0\n{POINTS}3 0 1 2\n3 1 2 3\n4 0 1 2 3\n".encode(), "face 2 has 4 corners"),
     "short face": (f"OFF\n4 1 0\n{POINTS}3 0 1\n".encode(), "face 0.*cut short"),
     "face with words": (f"OFF\n4 1 0\n{POINTS}3 0 1 x\n".encode(), "face 0 is '3 0 1 x'"),
     "face with a fraction": (f"OFF\n4 1 0\n{POINTS}3 0 1 2.5\n".encode(), "face 0 is '3 0 1 2.5'"),
     "short vertex": (b"OFF\n2 0 0\n0 0 0\n1 1\n", "vertex 1 is '1 1'"),
     "vertex with words": (b"OFF\n2 0 0\n0 0 0\n1 1 one\n", "vertex 1 is '1 1 one'"),
     "cut": (f"OFF\n4 4 6\n{POINTS}3 0 1 2\n".encode(), "4 vertices and 4 faces, but only 5 lines"),
-    "count too low": (f"OFF\n3 4 0\n{POINTS}{FACES}".encode(), "face 0 has 0 corners"),
+    "count too low": (f"OFF\n3 4 0\n{POINTS}{FACES}".encode(), "face 0 is '0 0 1'"),
     "absurd count": (b"OFF\n99999999999999999999 1 0\n0 0 0\n", "cut short"),
 }
 
@@ -73,6 +70,42 @@ BROKEN = {
 def test_broken_files_say_what_is_wrong(data, message):
     with pytest.raises(MeshError, match=message):
         parse_off(data)
+
+
+def test_polygons_are_kept_with_their_corners():
+    raw = parse_off(f"OFF\n4 4 0\n{POINTS}3 0 1 2\n4 0 1 2 3 255 0 0\n2 0 1\n3 1 2 3\n".encode())
+    assert raw.sizes.tolist() == [3, 4, 2, 3]
+    assert raw.corners.tolist() == [0, 1, 2, 0, 1, 2, 3, 0, 1, 1, 2, 3]
+
+
+def test_lines_after_the_last_face_are_a_note():
+    (note,) = parse_off(f"OFF\n4 4 6\n{POINTS}{FACES}2 0 1\nanything\n".encode()).notes
+    assert "2 lines follow" in note
+
+
+WRAPPED = {
+    "one number a line": f"OFF\n4 4 6\n{POINTS}{FACES}".replace(" ", "\n"),
+    "two vertices a line": f"OFF\n4 4 6\n0 0 0 1 0 0\n0 1 0 0 0 1\n{FACES}",
+    "a face over two lines": f"OFF\n4 4 6\n{POINTS}{FACES.replace('3 0 1 3', '3 0' + chr(10) + '1 3')}",
+    "no line ends at all": f"OFF\n4 4 6\n{POINTS}{FACES}".replace("\n", " "),
+    "no edge count": f"OFF\n4 4\n0 0 0 1 0 0\n0 1 0 0 0 1\n{FACES}",
+    "NOFF": f"NOFF\n4 4 6\n{NORMALS}{FACES}".replace("1 0 0\n", "1\n0 0\n"),
+}
+
+
+@pytest.mark.parametrize("text", WRAPPED.values(), ids=WRAPPED.keys())
+def test_wrapped_lines_are_read_number_by_number_and_noted(text):
+    raw = parse_off(text.encode())
+    np.testing.assert_array_equal(raw.vertices, VERTICES)
+    np.testing.assert_array_equal(raw.faces, TRIANGLES)
+    assert "wrapped" in raw.notes[0]
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_a_byte_order_mark_costs_nothing(encoding):
+    raw = parse_off(f"OFF\n4 4 6\n{POINTS}{FACES}".encode(encoding))
+    np.testing.assert_array_equal(raw.vertices, VERTICES)
+    np.testing.assert_array_equal(raw.faces, TRIANGLES)
 
 
 def test_colours_make_a_coff_file_that_reads_back():
