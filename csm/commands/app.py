@@ -1,13 +1,15 @@
-"""What every command shares: where the configuration lies, how errors reach the user, what a job leaves behind."""
+"""What every command shares: how errors and signals reach the user, and what a job leaves behind."""
 
 from __future__ import annotations
 
 import functools
 import json
-import logging
+import os
+import shutil
 import sys
+import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,19 +18,19 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
 from omegaconf import DictConfig
 
+from csm._signals import exit_status, terminable
+from csm.commands.explain import explained
+from csm.commands.groups import config_folder
+from csm.commands.help import help_text
+from csm.commands.schema import require_valid
+from csm.commands.words import to_overrides
 from csm.errors import CsmError
 from csm.mesh.io import atomic_path
 
 Run = Callable[[DictConfig], dict[str, Any]]
 
-_log = logging.getLogger(__name__)
-
-
-def config_folder() -> Path:
-    """Return the folder of the Hydra groups: inside the installed package, or beside it in a checkout."""
-    package = Path(__file__).resolve().parent.parent
-    inside = package / "conf"
-    return inside if inside.is_dir() else package.parent / "conf"
+_NO_WORK = ("--cfg", "-c", "--info", "-i", "--hydra-help", "--version", "--shell-completion", "-sc")
+_HELP = ("--help", "-h")
 
 
 def output_folder() -> Path:
@@ -42,75 +44,155 @@ def write_json(path: Path, content: Any) -> None:
         temporary.write_text(json.dumps(content, indent=1, allow_nan=True) + "\n")
 
 
-def command(config_name: str) -> Callable[[Run], Callable[[], Any]]:
+def command(
+    config_name: str, *, folder: bool = False, more: Callable[[], str] = str
+) -> Callable[[Run], Callable[[], Any]]:
     """Turn ``run(cfg) -> dict of floats`` into a Hydra command.
 
     An error that the user can mend is printed as one paragraph and ends the process with status 2; with
-    ``debug=true`` its traceback is shown.  In a multirun a failing job is recorded and the sweep goes on.
-    Every job writes what it returned to ``result.json`` in its folder.
+    ``debug=true`` its traceback is shown.  Ctrl-C ends it with 130, SIGTERM with 143.  In a multirun a failing job is
+    recorded and the sweep goes on.
+
+    Parameters
+    ----------
+    config_name
+        Name of its yaml, and of the command.
+    folder
+        Whether a job has a folder of its own, with ``result.json`` of what it returned.
+    more
+        Makes what its help says besides the options.
     """
 
     def decorate(run: Run) -> Callable[[], Any]:
+        failures: list[Exception] = []
+
         @hydra.main(version_base="1.3", config_path=str(config_folder()), config_name=config_name)
         @functools.wraps(run)
         def main(cfg: DictConfig) -> Any:
-            return _guarded(run, cfg)
+            return _job(run, cfg, folder, failures)
 
         def entry() -> Any:
-            sys.argv[1:] = in_order([without_null(argument) for argument in sys.argv[1:]])
-            return main()
+            arguments = sys.argv[1:]
+            if any(argument in _HELP for argument in arguments):
+                print(help_text(config_name, config_name, more()))
+                return None
+            with _errors_told(config_name, "debug=true" in arguments):
+                sys.argv[1:] = to_overrides(config_name, arguments)
+                with terminable():
+                    return _raising(failures, main, config_name, folder or _is_sweep(sys.argv))
 
         return entry
 
     return decorate
 
 
-def in_order(arguments: list[str]) -> list[str]:
-    """Return ``-m`` first, wherever it stands: Hydra's parser wants all key=value in one piece.
+class _errors_told:  # noqa: N801 - reads as a phrase
+    """Print what a user can mend as one paragraph, and end the process with the status that says how it ended."""
 
-    Examples
-    --------
-    >>> in_order(["experiment=humans", "-m", "seed=0,1"])
-    ['-m', 'experiment=humans', 'seed=0,1']
-    """
-    flags = [argument for argument in arguments if argument in ("-m", "--multirun")]
-    return flags + [argument for argument in arguments if argument not in flags]
+    def __init__(self, config_name: str, debug: bool) -> None:
+        self._config_name, self._debug = config_name, debug
+
+    def __enter__(self) -> None:
+        os.environ["HYDRA_FULL_ERROR"] = "1"  # errors come here, instead of being printed by Hydra
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: Any) -> None:
+        if error is None or isinstance(error, SystemExit):
+            return
+        if self._debug:
+            traceback.print_exception(error)
+        if isinstance(error, KeyboardInterrupt):
+            said = str(error) or "what was finished is kept; the same command goes on from there or begins again"
+            print(f"csm: stopped: {said}", file=sys.stderr)
+            sys.exit(exit_status(error))
+        text = explained(error, self._config_name)
+        if text is None:
+            if not self._debug:
+                traceback.print_exception(error)
+            print(
+                f"csm: {type(error).__name__}: {error}\ncsm: this is a defect of csm; please report it", file=sys.stderr
+            )
+            sys.exit(1)
+        print(f"csm: {text}", file=sys.stderr)
+        sys.exit(2)
 
 
-def without_null(argument: str) -> str:
-    """Return ``logger=none`` for ``logger=null``, which Hydra refuses for a group; other arguments stay.
+def _raising(failures: list[Exception], main: Callable[[], Any], config_name: str, own_folder: bool) -> Any:
+    """Run a command, and raise here what its job raised: raised through Hydra it would be announced twice."""
 
-    Examples
-    --------
-    >>> without_null("logger=null"), without_null("resume=null")
-    ('logger=none', 'resume=null')
-    """
-    group, _, value = argument.partition("=")
-    has_none = group.isidentifier() and (config_folder() / group / "none.yaml").is_file()
-    return f"{group}=none" if has_none and value in ("null", "") and "=" in argument else argument
+    def run() -> Any:
+        failures.clear()
+        result = main()
+        if failures:
+            raise failures[0]
+        return result
+
+    return _in_own_folder(run, config_name) if own_folder else run()
 
 
-def _guarded(run: Run, cfg: DictConfig) -> Any:
+def _in_own_folder(main: Callable[[], Any], config_name: str) -> Any:
+    """Run a command in a new folder under ``outputs/``, which is removed again if nothing but a failure is in it."""
+    arguments = sys.argv[1:]
+    sweeping = _is_sweep(arguments)
+    key = "hydra.sweep.dir" if sweeping else "hydra.run.dir"
+    if any(argument.startswith(f"{key}=") or argument in _NO_WORK for argument in arguments):
+        return main()
+    made = new_folder(Path("outputs") / (f"{config_name}_sweep" if sweeping else config_name))
+    sys.argv.insert(1 + sweeping, f"{key}={made}")
+    try:
+        return main()
+    except BaseException:
+        _remove_if_bare(made)
+        raise
+
+
+def _is_sweep(arguments: Sequence[str]) -> bool:
+    return any(argument in ("-m", "--multirun") for argument in arguments)
+
+
+def new_folder(above: Path) -> Path:
+    """Make a folder named after the present second, with a number where another run was faster, and return it."""
+    above.mkdir(parents=True, exist_ok=True)
+    stamp = time.strftime("%Y-%m-%d_%H-%M-%S")
+    for suffix in ("", *(f"_{n}" for n in range(2, 1000))):
+        try:
+            (above / f"{stamp}{suffix}").mkdir()
+        except FileExistsError:
+            continue
+        return above / f"{stamp}{suffix}"
+    raise CsmError(f"{above}: a thousand runs began in one second; try again")
+
+
+def _remove_if_bare(folder: Path) -> None:
+    """Remove the folder of a run that failed before it wrote anything; folders above go if they are empty."""
+    bare = {".hydra", "result.json", ".csm.lock", "multirun.yaml"}
+    if not folder.is_dir() or any(p.name not in bare and p.suffix != ".log" for p in folder.iterdir()):
+        return
+    shutil.rmtree(folder, ignore_errors=True)
+    for above in (folder.parent, folder.parent.parent):
+        try:
+            above.rmdir()
+        except OSError:
+            return
+
+
+def _job(run: Run, cfg: DictConfig, folder: bool, failures: list[Exception]) -> Any:
+    """Run one job; a failure goes to `failures`, in a sweep it is kept in the job's folder and the others go on."""
     sweeping = HydraConfig.get().mode == RunMode.MULTIRUN
     try:
+        require_valid(cfg)
         result = run(cfg)
-    except Exception as raised:
-        error = _own_error(raised)
-        record = {"status": "failed", "error": str(error), "kind": type(error).__name__}
-        write_json(output_folder() / "result.json", record)
-        mendable = isinstance(error, CsmError)
-        if cfg.get("debug") or not mendable:
-            traceback.print_exc()
-        if not sweeping and not mendable:
-            sys.exit(1)
-        print(f"csm: {error}", file=sys.stderr)
+    except Exception as error:
+        text = explained(error, str(HydraConfig.get().job.config_name))
+        if folder or sweeping:
+            record = {"status": "failed", "error": text or str(error), "kind": type(error).__name__}
+            write_json(output_folder() / "result.json", record)
         if not sweeping:
-            sys.exit(2)
+            failures.append(error)
+            return None
+        if text is None or cfg.get("debug"):
+            traceback.print_exc()
+        print(f"csm: {text or error}", file=sys.stderr)
         return None
-    write_json(output_folder() / "result.json", {"status": "ok", **result})
+    if folder or sweeping:
+        write_json(output_folder() / "result.json", {"status": "ok", **result})
     return result.get("objective")
-
-
-def _own_error(error: Exception) -> Exception:
-    """Return the error that Hydra wrapped while it made an object, if it is one of csm's."""
-    return error.__cause__ if isinstance(error.__cause__, CsmError) else error

@@ -1,4 +1,4 @@
-"""``csm describe mesh=a.off out=d.npz``: compute a descriptor of one mesh."""
+"""``csm describe a.off d.npz``: compute a descriptor of one mesh."""
 
 from __future__ import annotations
 
@@ -12,35 +12,46 @@ from omegaconf import DictConfig
 
 from csm.commands.app import command
 from csm.commands.groups import register
+from csm.commands.outputs import require_file_place, require_not_input, require_own_archive
 from csm.descriptors.base import Descriptor
 from csm.errors import ConfigError
-from csm.mesh.check import require_usable
-from csm.mesh.io import atomic_path, read_mesh
+from csm.matching.subjects import subject_of
+from csm.mesh.io import atomic_path
 
 register("descriptor")
+
+
+ARRAYS = ("values", "columns", "descriptor", "parameters")
+"""What the archive holds."""
 
 
 def run(cfg: DictConfig) -> dict[str, Any]:
     """Write values (N, Q), column names and parameters; return the size."""
     if cfg.mesh is None or cfg.out is None:
-        raise ConfigError("describe needs mesh=FILE and out=FILE.npz")
+        raise ConfigError("describe needs a mesh and a place: csm describe MESH OUT.npz")
     out = Path(cfg.out)
     if out.suffix != ".npz":
         raise ConfigError(f"out={out}: descriptors are written as .npz")
-    mesh = read_mesh(cfg.mesh)
+    require_file_place(out)
+    require_not_input([out], [Path(cfg.mesh)])
+    require_own_archive(out, ARRAYS, cfg.overwrite)
     descriptor: Descriptor = instantiate(cfg.descriptor)
-    require_usable(mesh)
-    features = descriptor(mesh)
+    subject = subject_of(cfg.mesh, cfg.clean)
+    for note in subject.notes:
+        print(f"note: {subject.given.label}: {note}")
+    features = descriptor(subject.cleaned.mesh)
+    at = subject.cleaned.vertex_map
+    values = np.where(at[:, None] >= 0, features.values[at], np.nan)
     with atomic_path(out) as temporary:
         np.savez(
             temporary,
-            values=features.values,
+            values=values,
             columns=np.array(features.columns),
             descriptor=np.array(descriptor.name),
             parameters=np.array(json.dumps(descriptor.parameters())),
         )
-    n, columns = features.values.shape
-    print(f"{mesh.name}: {n} vertices, {columns} columns of {descriptor.name}: {out}")
+    n, columns = values.shape
+    print(f"{subject.given.name}: {n} vertices, {columns} columns of {descriptor.name}: {out}")
     return {"vertices": n, "columns": columns}
 
 

@@ -25,7 +25,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     return numbers(tested)
 
 
-main = command("evaluate")(run)
+main = command("evaluate", folder=True)(run)
 
 if __name__ == "__main__":
     main()

@@ -1,4 +1,4 @@
-"""One paragraph for every error that a user can mend, whoever raised it: csm, the operating system, Hydra, Lightning."""
+"""One paragraph for every error that a user can mend: of csm, the operating system, Hydra, PyTorch and Lightning."""
 
 from __future__ import annotations
 
@@ -193,8 +193,7 @@ def _of_torch(error: BaseException) -> str | None:
         return f"the trainer refuses its settings: {first}"
     if kind in ("OutOfMemoryError", "AcceleratorError") or "out of memory" in text:
         return f"the graphics card cannot do this: {first}; choose device=cpu and trainer=cpu, or smaller meshes"
-    if isinstance(error, RuntimeError) and re.search(
-        r"No CUDA GPUs|Found no NVIDIA driver|not compiled with CUDA", text
-    ):
+    no_card = r"No CUDA GPUs|Found no NVIDIA driver|not compiled with CUDA"
+    if isinstance(error, RuntimeError) and re.search(no_card, text):
         return f"there is no graphics card that PyTorch can use ({first}); choose device=cpu and trainer=cpu"
     return None

@@ -1,4 +1,4 @@
-"""``csm COMMAND --help``: options with what they mean, and groups with what can be chosen, from the yaml files alone."""
+"""``csm COMMAND --help``: options and groups in words, read from the yaml files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``csm match source=a.off target=b.ply out=DIR``: match two meshes of your own."""
+"""``csm match a.off b.ply out=DIR``: match two meshes of your own."""
 
 from __future__ import annotations
 
@@ -11,28 +11,40 @@ from omegaconf import DictConfig
 
 from csm.commands.app import command
 from csm.commands.groups import register
+from csm.commands.outputs import require_not_input, require_own, require_place
 from csm.data.store import Store
 from csm.errors import ConfigError
 from csm.matching import DescriptorMethod, Method, match_meshes
-from csm.viewer.match_folder import write_match
+from csm.viewer.match_folder import ACCOUNT, FILES, write_match
 
 register("descriptor")
 
 
 def run(cfg: DictConfig) -> dict[str, Any]:
     """Match and write the map, the coloured meshes, a picture page and an account; return counts."""
-    if None in (cfg.source, cfg.target, cfg.out):
-        raise ConfigError("match needs source=FILE target=FILE out=FOLDER")
-    begun, folder = time.perf_counter(), Path(cfg.out)
+    if None in (cfg.source, cfg.target):
+        raise ConfigError("match needs two meshes: csm match SOURCE TARGET [OUT]")
+    begun = time.perf_counter()
+    folder = Path(cfg.out or f"{Path(cfg.source).stem}_to_{Path(cfg.target).stem}")
+    _require_place(folder, [Path(cfg.source), Path(cfg.target)], cfg.overwrite)
     method, text = _method(cfg)
-    match = match_meshes(cfg.source, cfg.target, method, store=Store(cfg.store), device=cfg.device)
+    match = match_meshes(cfg.source, cfg.target, method, clean=cfg.clean, store=Store(cfg.store), device=cfg.device)
     write_match(match, folder, text, time.perf_counter() - begun)
+    for note in match.notes:
+        print(f"note: {note}")
     print(
         f"{match.source.name} ({match.source.n_vertices} vertices) -> {match.target.name} "
         f"({match.target.n_vertices} vertices) by {text}; "
-        f"{100 * match.coverage:.1f} % of the target is reached: {folder}"
+        f"{100 * match.coverage:.1f} % of the target is reached: {folder}\n{match.confidence.verdict}"
     )
-    return {"coverage": match.coverage, "vertices": match.source.n_vertices}
+    return {"coverage": match.coverage, "returned": match.confidence.returned, "vertices": match.source.n_vertices}
+
+
+def _require_place(folder: Path, inputs: list[Path], overwrite: bool) -> None:
+    require_place(folder)
+    outputs = [folder / name for name in (*FILES, ACCOUNT)]
+    require_not_input(outputs, inputs)
+    require_own(outputs[:-1], outputs[-1], overwrite)
 
 
 def _method(cfg: DictConfig) -> tuple[Method, str]:

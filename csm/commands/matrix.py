@@ -12,6 +12,7 @@ from omegaconf import DictConfig, open_dict
 
 from csm.commands.app import command
 from csm.commands.groups import make_protocol, plain
+from csm.commands.schema import require_valid
 from csm.commands.train import make_training, require_network_of_recipe
 from csm.errors import ConfigError
 from csm.evaluation.report import ResultRow, add_rows
@@ -67,6 +68,7 @@ def rows_of(cfg: DictConfig) -> list[Row]:
 def _row(cfg: DictConfig, name: str, seed: int) -> Row:
     overrides = [*map(str, cfg.rows[name]), *map(str, cfg.overrides)]
     train = compose("train", overrides=overrides)
+    require_valid(train)
     require_network_of_recipe(train, overrides)
     with open_dict(train):
         train.update(name=name, seed=seed, store=cfg.store, workers=cfg.workers)
@@ -84,7 +86,7 @@ def identity_of(cfg: DictConfig) -> dict[str, Any]:
     }
 
 
-main = command("matrix")(run)
+main = command("matrix", folder=True)(run)
 
 if __name__ == "__main__":
     main()

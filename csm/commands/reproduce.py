@@ -10,7 +10,7 @@ from typing import Any
 
 from hydra import compose
 from hydra.core.config_store import ConfigStore
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import DictConfig
 
 from csm._parallel import n_processes
 from csm.commands import matrix
@@ -23,7 +23,6 @@ from csm.mesh.io import copy_file
 from csm.reproduction.registry import STUDIES, entry, listing, make_study, options_of
 from csm.reproduction.study import Context, FilledMatrix, Findings, write_findings
 
-OmegaConf.register_new_resolver("studies", listing, replace=True)
 ConfigStore.instance().store(name="studies", node={name: options_of(name) for name in STUDIES}, provider="csm")
 
 
@@ -84,7 +83,7 @@ def conclude(findings: Findings, out: Path, results: str | None, seconds: float)
     print(f"\n{findings.markdown()}\n\nin {seconds:.0f} s: {', '.join(str(path) for path in files)}", flush=True)
 
 
-main = command("reproduce")(run)
+main = command("reproduce", more=lambda: f"studies:\n{listing()}")(run)
 
 if __name__ == "__main__":
     main()

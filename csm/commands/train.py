@@ -99,7 +99,7 @@ def conclude(cfg: DictConfig, tested: list[Tested], notes: str) -> None:
     print(f"table:        {folder / 'rows.json'}, rows.csv\nreport:       {page}")
 
 
-main = command("train")(run)
+main = command("train", folder=True)(run)
 
 if __name__ == "__main__":
     main()

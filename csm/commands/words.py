@@ -29,24 +29,14 @@ LISTS = ("targets",)
 """Keys that take all words."""
 
 PATHS = frozenset(
-    [
-        "source",
-        "target",
-        "out",
-        "mesh",
-        "in",
-        "checkpoint",
-        "folder",
-        "resume",
-        "results",
-        "store",
-        "data.root",
-        "data.split",
-        "data.test_roots",
-    ]
+    (
+        *("source", "target", "out", "mesh", "in", "checkpoint", "folder", "resume", "results", "store"),
+        *("data.root", "data.split", "data.test_roots"),
+    )
 )
 """Keys whose values are paths, or lists of them."""
 
+_OPTIONAL = ("experiment", "recipe")  # groups that may be left out: null for no option
 _ALONE = {"-m", "--multirun", "-r", "--run", "--resolve", "--help", "-h", "--hydra-help", "--version"}
 _KEY = re.compile(r"[+~]{0,2}[A-Za-z_][\w./@:-]*")
 
@@ -80,16 +70,21 @@ def to_overrides(command: str, arguments: Sequence[str]) -> list[str]:
     overrides: list[str] = []
     for before, argument in zip(("", *arguments), arguments, strict=False):
         if argument in ("-m", "--multirun"):
-            flags.append(argument)
-        elif (argument.startswith("-") and not Path(argument).exists()) or (
-            before.startswith("-") and before not in _ALONE and "=" not in before
-        ):
+            flags[:] = ["-m"]
+        elif _is_option(argument, before):
             options.append(argument)
         elif _is_word(argument):
             words.append(argument)
         else:
             overrides.append(_override(argument, sweeping))
-    return [*flags, *_named(command, words), *overrides, *options]
+    return [*flags, *_named(command, words), *filter(None, overrides), *options]
+
+
+def _is_option(argument: str, before: str) -> bool:
+    """Tell whether an argument is a flag of Hydra, or the value of the flag before it."""
+    if argument.startswith("-") and not Path(argument).exists():
+        return True
+    return before.startswith("-") and before not in _ALONE and "=" not in before
 
 
 def _is_word(argument: str) -> bool:
@@ -126,6 +121,8 @@ def _meant(word: str) -> str:
 
 def _override(argument: str, sweeping: bool) -> str:
     key, equals, value = argument.partition("=")
+    if key in _OPTIONAL and value in ("", "null"):
+        return ""
     if key in PATHS and value not in ("", "null"):
         return f"{key}={_path_value(value, sweeping)}"
     return without_null(argument) if equals else argument

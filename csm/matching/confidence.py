@@ -49,8 +49,8 @@ class Confidence:
         if self.returned >= 0.6:
             return f"{share}; where they do not, limbs may be exchanged or a part may have no partner"
         return (
-            f"WARNING: only {share}, so this map is probably wrong in large parts: the shapes may differ in kind, or one "
-            "may be a part of the other"
+            f"WARNING: only {share}, so this map is probably wrong in large parts: the shapes may differ in kind, or "
+            "one may be a part of the other"
         )
 
 

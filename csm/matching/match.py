@@ -141,7 +141,7 @@ def _compared(source: Subject, target: Subject) -> list[str]:
     parts = [body_of(mesh).n_components for mesh in meshes]
     if parts[0] != parts[1]:
         said.append(
-            f"{meshes[0].label} has {parts[0]} components of at least 1 % of the area and {meshes[1].label} {parts[1]}: "
+            f"{meshes[0].label} has {parts[0]} components of at least 1 % of the area, {meshes[1].label} {parts[1]}: "
             "their spectra are hard to compare; join the components or match them one by one"
         )
     return said

@@ -55,7 +55,7 @@ class Subject:
         if self.cleaned.text:
             said.append(f"cleaned for the computation, results are on the vertices of the file: {self.cleaned.text}")
         remaining = "; ".join(finding.text for finding in self.findings)
-        return tuple([*said, *([remaining] if remaining else [])])
+        return (*said, *([remaining] if remaining else []))
 
 
 def subject_of(mesh: MeshLike, cleaning: Cleaning = "auto") -> Subject:

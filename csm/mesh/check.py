@@ -80,8 +80,8 @@ def require_usable(mesh: Mesh) -> None:
     errors = [finding.text for finding in check(mesh) if finding.severity == "error"]
     if errors:
         raise MeshError(
-            f"{mesh.label}: {'; '.join(errors)}. Spectral operators need this mended; `csm clean` does what can be done, "
-            "and keeps the map from the old vertices to the new ones"
+            f"{mesh.label}: {'; '.join(errors)}. Spectral operators need this mended; `csm clean` does what can be "
+            "done, and keeps the map from the old vertices to the new ones"
         )
 
 

@@ -153,7 +153,8 @@ class _Work:
         if isinstance(mesh, Mesh):
             triangles, face_map = mesh, np.arange(mesh.n_faces)
         else:
-            triangles, face_map = triangulated(mesh)
+            found = triangulated(mesh)
+            triangles, face_map = found.mesh, found.face_map
             count = int((mesh.sizes != 3).sum())
             if count:
                 mends.append(Mend("triangulate", count, f"{count} polygons triangulated"))
@@ -233,10 +234,8 @@ class _Work:
         found = turns(self.vertices, self.faces)
         self.faces[found.flip] = self.faces[found.flip][:, ::-1]
         whole = found.n_inside_out
-        text = "faces turned: " + (
-            "inside out as a whole" if whole and found.flip.all() else "against their neighbours"
-        )
-        self._did("orient", int(found.flip.sum()), text)
+        why = "inside out as a whole" if whole and found.flip.all() else "against their neighbours"
+        self._did("orient", int(found.flip.sum()), f"faces turned: {why}")
         self._did("one_sided", found.n_one_sided, "components are one-sided and cannot be oriented")
 
     def done(self, mesh: Mesh | PolygonMesh) -> Cleaned:

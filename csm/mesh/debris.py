@@ -90,10 +90,8 @@ def body_of(mesh: Mesh, debris: float = DEBRIS) -> Body:
     total = float(areas.sum())
     used = np.zeros(len(areas), dtype=bool)
     used[label[mesh.faces[:, 0]]] = True
-    if not (np.isfinite(total) and total > 0):
-        kept = used
-    else:
-        kept = used & (areas >= min(debris * total, areas.max()))
+    has_area = np.isfinite(total) and total > 0
+    kept = used & (areas >= min(debris * total, areas.max())) if has_area else used
     vertices: BoolArray = kept[label]
     faces: BoolArray = kept[label[mesh.faces[:, 0]]]
     area = float(areas[kept].sum())

@@ -74,7 +74,7 @@ def sound_faces(faces: IntArray) -> BoolArray:
 
 
 def collapsed(vertices: FloatArray, faces: IntArray, flat: BoolArray) -> IntArray:
-    """Return for each vertex that only `flat` faces touch, (M,), its nearest neighbour, for others itself; shape (N,)."""
+    """Return for each vertex that only `flat` faces, (M,), touch its nearest neighbour, else itself; shape (N,)."""
     target = np.arange(len(vertices))
     alive = np.zeros(len(vertices), dtype=bool)
     alive[faces[~flat]] = True
@@ -186,7 +186,7 @@ def turns(vertices: FloatArray, faces: IntArray) -> Turns:
     rows = np.concatenate([f, f + m])
     columns = np.concatenate([np.where(against, g + m, g), np.where(against, g, g + m)])
     graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(2 * m, 2 * m))
-    state = connected_components(graph, directed=False)[1]
+    state = connected_components(graph, directed=False)[1].astype(np.int64)
     one_sided = state[:m] == state[m:]
     part = components(f, g, m)
     crosses = np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])

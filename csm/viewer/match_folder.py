@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from pathlib import Path
 from typing import Any
@@ -9,12 +10,19 @@ from typing import Any
 from csm.evaluation.provenance import provenance
 from csm.matching.match import Match
 from csm.mesh.io import atomic_path, write_map, write_mesh
+from csm.mesh.shape import Mesh
 from csm.viewer.colors import position_colors, pull_colors
 from csm.viewer.html import Panel, Viewer, viewer_html, write_html
 
+FILES = ("map.txt", "map.npz", "confidence.txt", "source.ply", "target.ply", "match.html")
+"""What `write_match` writes, besides its account."""
+
+ACCOUNT = "match.json"
+"""How the match was made; it is written last and has the hashes of the other files."""
+
 
 def write_match(match: Match, folder: Path, method: str, seconds: float) -> None:
-    """Write ``map.txt``, ``map.npz``, ``source.ply``, ``target.ply``, ``match.html`` and ``match.json``.
+    """Write the `FILES` of a match and its `ACCOUNT`.
 
     The target is coloured by position, and every source vertex has the colour of the vertex that it is mapped to.
 
@@ -35,16 +43,31 @@ def write_match(match: Match, folder: Path, method: str, seconds: float) -> None
         write_map(folder / name, indices, meaning=meaning)
     reference = position_colors(target)
     colors = pull_colors(reference, indices)
+    _write_confidence(folder / "confidence.txt", match)
     write_mesh(folder / "source.ply", source, colors)
     write_mesh(folder / "target.ply", target, reference)
-    with atomic_path(folder / "match.json") as temporary:
-        temporary.write_text(json.dumps(_account(match, meaning, method, seconds), indent=1) + "\n", encoding="utf-8")
     viewer = Viewer([Panel(source, colors, to_reference=indices), Panel(target, reference)], reference=1)
     page = viewer_html(f"{source.name} → {target.name}", viewer, text=_caption(match, method))
     write_html(folder / "match.html", page)
+    account = _account(match, meaning, method, seconds)
+    account["files"] = {name: hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in FILES}
+    with atomic_path(folder / ACCOUNT) as temporary:
+        temporary.write_text(json.dumps(account, indent=1) + "\n", encoding="utf-8")
+
+
+def _write_confidence(path: Path, match: Match) -> None:
+    head = f"# line i = confidence, from 0 to 1, in the match of vertex i of {match.source.name}; 0-based"
+    with atomic_path(path) as temporary:
+        lines = [head, *(f"{value:.4f}" for value in match.confidence.values)]
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def _caption(match: Match, method: str) -> str:
+    notes = "".join(f"\n\n**Note.** {note}." for note in match.notes)
+    return _what_is_shown(match, method) + f"\n\n{match.confidence.verdict}.{notes}"
+
+
+def _what_is_shown(match: Match, method: str) -> str:
     return (
         f"Every vertex of {match.source.name} is mapped to the vertex of {match.target.name} that is nearest in "
         f"{method}. The target is coloured by position; a source vertex has the colour of its match. "
@@ -55,13 +78,20 @@ def _caption(match: Match, method: str) -> str:
 def _account(match: Match, meaning: str, method: str, seconds: float) -> dict[str, Any]:
     made = provenance()
     return {
-        "source": {"name": match.source.name, "vertices": match.source.n_vertices},
-        "target": {"name": match.target.name, "vertices": match.target.n_vertices},
+        "source": _of_mesh(match.source),
+        "target": _of_mesh(match.target),
         "map": f"{meaning}; 0-based",
         "method": f"{match.matcher.name} neighbour in {method}",
         "coverage": match.coverage,
+        "returned": match.confidence.returned,
+        "verdict": match.confidence.verdict,
+        "notes": list(match.notes),
         "seconds": round(seconds, 2),
         "command": made.command,
         "commit": made.commit,
         "versions": made.versions,
     }
+
+
+def _of_mesh(mesh: Mesh) -> dict[str, Any]:
+    return {"name": mesh.name, "file": mesh.source or None, "vertices": mesh.n_vertices}

@@ -7,7 +7,7 @@ from tests.shapes import blob, plane, sphere
 
 
 def scattered(mesh: Mesh, n: int, size: float, seed: int = 0) -> tuple[Mesh, np.ndarray]:
-    """Return a mesh among `n` small triangles and a lone vertex, all numbers shuffled, and the new number of each vertex."""
+    """Return a mesh among `n` specks and a lone vertex, shuffled, and the new number of each of its vertices."""
     rng = np.random.default_rng(seed)
     specks = (rng.normal(size=(n, 1, 3)) + size * rng.normal(size=(n, 3, 3))).reshape(-1, 3)
     vertices = np.vstack([mesh.vertices, specks, [[7.0, 7.0, 7.0]]])

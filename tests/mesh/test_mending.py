@@ -79,7 +79,7 @@ def test_two_cubes_that_share_an_edge_are_parted_into_two_cubes():
     import trimesh
 
     box = trimesh.creation.box()
-    vertices = np.vstack([box.vertices, np.asarray(box.vertices) + [1, 1, 0]])
+    vertices = np.vstack([box.vertices, np.asarray(box.vertices) + np.array([1, 1, 0])])
     _, first, inverse = np.unique(vertices.round(9), axis=0, return_index=True, return_inverse=True)
     faces = np.asarray(inverse).ravel()[np.vstack([box.faces, np.asarray(box.faces) + len(box.vertices)])]
     new, origin = split(vertices[first], faces)
@@ -132,9 +132,11 @@ def test_a_cavity_stays_oriented_inwards():
 def test_a_moebius_strip_is_left_as_it_is():
     n = 20
     u = np.linspace(0, 2 * np.pi, n, endpoint=False)
-    edge = lambda s: np.stack(
-        [(2 + s * np.cos(u / 2)) * np.cos(u), (2 + s * np.cos(u / 2)) * np.sin(u), s * np.sin(u / 2)], 1
-    )
+
+    def edge(s):
+        r = 2 + s * np.cos(u / 2)
+        return np.stack([r * np.cos(u), r * np.sin(u), s * np.sin(u / 2)], 1)
+
     i, j = np.arange(n), (np.arange(n) + 1) % n
     a, b = np.where(j, j, n), np.where(j, n + j, 0)  # the strip closes with its sides exchanged
     faces = np.vstack([np.stack([i, a % (2 * n), n + i], 1), np.stack([a % (2 * n), b, n + i], 1)])

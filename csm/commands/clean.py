@@ -1,0 +1,89 @@
+"""``csm clean a.stl b.ply``: mend a mesh, and write what became of each of its vertices beside it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from omegaconf import DictConfig
+
+from csm.commands.app import command
+from csm.commands.outputs import digest, require_file_place, require_not_input, require_own
+from csm.errors import ConfigError
+from csm.evaluation.provenance import provenance
+from csm.mesh.check import check
+from csm.mesh.clean import Cleaned, clean
+from csm.mesh.io import atomic_path, read_polygons, write_map, write_mesh
+
+
+def run(cfg: DictConfig) -> dict[str, Any]:
+    """Write the cleaned mesh, both maps between old and new vertices, and an account; return counts."""
+    given, out = cfg["in"], cfg.out
+    if given is None or out is None:
+        raise ConfigError("clean needs a mesh and a place: csm clean IN OUT")
+    source, target = Path(given), Path(out)
+    files = places(target)
+    require_file_place(target)
+    require_not_input([*files, account_of(target)], [source])
+    require_own(files, account_of(target), cfg.overwrite)
+    mesh = read_polygons(source)
+    done = clean(
+        mesh, weld=cfg.weld, split=cfg.split, debris=cfg.debris, orient=cfg.orient, tolerance=float(cfg.tolerance)
+    )
+    write_cleaned(done, source, target)
+    report(done, source, target)
+    return {"vertices": done.mesh.n_vertices, "faces": done.mesh.n_faces, "steps": len(done.mends)}
+
+
+def places(target: Path) -> list[Path]:
+    """Return the files that are written for a cleaned mesh: the mesh, and the maps old -> new and new -> old."""
+    return [target, *(target.with_name(f"{target.stem}.{name}.txt") for name in ("old_to_new", "new_to_old"))]
+
+
+def account_of(target: Path) -> Path:
+    """Return the json that says what was done."""
+    return target.with_name(f"{target.stem}.clean.json")
+
+
+def write_cleaned(done: Cleaned, source: Path, target: Path) -> None:
+    """Write the mesh, the maps and the account."""
+    mesh_file, old_to_new, new_to_old = places(target)
+    write_mesh(mesh_file, done.mesh)
+    forward = f"line i = vertex of {target.name} that vertex i of {source.name} has become"
+    backward = f"line i = vertex of {source.name} that vertex i of {target.name} was"
+    write_map(old_to_new, done.vertex_map, meaning=forward)
+    write_map(new_to_old, done.origin, meaning=backward)
+    made = provenance()
+    account = {
+        "in": str(source),
+        "out": str(target),
+        "steps": [{"kind": mend.kind, "count": mend.count, "text": mend.text} for mend in done.mends],
+        "vertices": {"before": len(done.vertex_map), "after": done.mesh.n_vertices},
+        "faces": {"after": done.mesh.n_faces},
+        "findings": [finding.text for finding in check(done.mesh)],
+        "files": {path.name: digest(path) for path in places(target)},
+        "command": made.command,
+        "commit": made.commit,
+        "versions": made.versions,
+    }
+    with atomic_path(account_of(target)) as temporary:
+        temporary.write_text(json.dumps(account, indent=1) + "\n", encoding="utf-8")
+
+
+def report(done: Cleaned, source: Path, target: Path) -> None:
+    """Print what was done and what remains."""
+    for note in done.mesh.notes:
+        print(f"note: {source}: {note}")
+    for mend in done.mends:
+        print(f"{mend.kind:<13} {mend.text}")
+    remaining = [finding.text for finding in check(done.mesh)]
+    print("nothing had to be mended" if not done.mends else f"{len(done.mends)} steps changed the mesh", end="; ")
+    print("nothing remains" if not remaining else f"what remains: {'; '.join(remaining)}")
+    print(f"{len(done.vertex_map)} vertices -> {done.mesh.n_vertices}: {', '.join(map(str, places(target)))}")
+
+
+main = command("clean")(run)
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,130 @@
+"""Where a command may write: never over its own input, and over files that csm did not write only when told to."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from csm.errors import ConfigError
+
+_OVERWRITE = "give another out=, or overwrite=true to replace it"
+
+
+def require_place(path: Path, what: str = "out") -> None:
+    """Raise before the work if a file or folder cannot be written at `path`; nothing is made.
+
+    Raises
+    ------
+    ConfigError
+        If the name is too long, a part of the path is a file, or the folder may not be written.
+    """
+    try:
+        path.lstat()
+    except FileNotFoundError:
+        pass
+    except OSError as error:
+        raise ConfigError(
+            f"{what}={path}: {(error.strerror or 'cannot be used').lower()}; choose another place"
+        ) from None
+    above = next(p for p in [path, *path.absolute().parents] if os.path.lexists(p) and (p != path or p.is_dir()))
+    if not above.is_dir():
+        raise ConfigError(f"{what}={path}: {above} is a file, wanted a folder; choose another place")
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise ConfigError(f"{what}={path}: the folder {above} may not be written; choose another place")
+
+
+def require_file_place(path: Path, what: str = "out") -> None:
+    """Raise before the work if a file cannot be written at `path`, see `require_place`."""
+    if path.is_dir():
+        raise ConfigError(f"{what}={path}: this is a folder, wanted the name of a file")
+    require_place(path.parent if os.path.lexists(path) else path, what)
+
+
+def require_not_input(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
+    """Raise if an output is one of the files that the command reads, by whatever name.
+
+    Raises
+    ------
+    ConfigError
+        With the file.
+    """
+    read = {_identity(path): path for path in inputs}
+    for path in outputs:
+        if _identity(path) in read:
+            raise ConfigError(
+                f"{path}: this is the input {read[_identity(path)]}, which would be replaced; choose another out="
+            )
+
+
+def _identity(path: Path) -> Any:
+    try:
+        found = path.stat()
+    except OSError:
+        return os.path.realpath(path)
+    return found.st_dev, found.st_ino
+
+
+def digest(path: Path) -> str:
+    """Return the SHA-256 (hex) of a file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def require_own(outputs: Iterable[Path], account: Path, overwrite: bool) -> None:
+    """Raise if an output exists that csm did not write, or that was changed since.
+
+    Parameters
+    ----------
+    outputs
+        The files to be written.
+    account
+        The json that an earlier run wrote with them: it has the hash of each under "files".
+    overwrite
+        Whether to let all of them be replaced.
+
+    Raises
+    ------
+    ConfigError
+        With the first such file.
+    """
+    if overwrite:
+        return
+    files = _files_of(account)
+    for path in outputs:
+        if os.path.lexists(path) and (path.is_dir() or files.get(path.name) != digest(path)):
+            why = "has been changed since csm wrote it" if path.name in files else "was not written by csm here"
+            raise ConfigError(f"{path}: there is such a file, which {why}; {_OVERWRITE}")
+    if account.exists() and not files:
+        raise ConfigError(f"{account}: there is such a file, which was not written by csm here; {_OVERWRITE}")
+
+
+def _files_of(account: Path) -> Mapping[str, str]:
+    try:
+        files = json.loads(account.read_text(encoding="utf-8")).get("files")
+    except (OSError, ValueError, AttributeError):
+        return {}
+    return files if isinstance(files, dict) else {}
+
+
+def require_own_archive(path: Path, arrays: Iterable[str], overwrite: bool) -> None:
+    """Raise if a .npz exists that does not have the arrays that this command writes.
+
+    Raises
+    ------
+    ConfigError
+        If so, and it may not be replaced.
+    """
+    if overwrite or not os.path.lexists(path):
+        return
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            own = set(archive.files) == set(arrays)
+    except Exception:
+        own = False
+    if not own:
+        raise ConfigError(f"{path}: there is such a file, which was not written by csm describe; {_OVERWRITE}")
