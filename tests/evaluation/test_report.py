@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-import subprocess
-import sys
+import multiprocessing
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -144,20 +143,21 @@ def test_foreign_files_are_refused_by_name_and_never_replaced(tmp_path: Path, te
     assert path.read_text() == text
 
 
-ADDING = """
-import sys
-from csm.evaluation.report import add_rows
-from tests.evaluation.test_report import row
-for i in range(int(sys.argv[2])):
-    add_rows(sys.argv[1], [row(method=f"{sys.argv[3]} {i}")])
-"""
+def _add(path: str, name: str, n: int) -> None:
+    for i in range(n):
+        add_rows(path, [row(method=f"{name} {i}")])
 
 
 @pytest.mark.parametrize("n", [25, pytest.param(100, marks=pytest.mark.slow)])
 def test_processes_that_add_rows_at_once_lose_none(tmp_path: Path, n: int) -> None:
     path = str(tmp_path / "r.json")
-    adding = [subprocess.Popen([sys.executable, "-c", ADDING, path, str(n), name]) for name in "abcd"]
-    assert [process.wait(120) for process in adding] == [0] * 4
+    context = multiprocessing.get_context("fork")
+    adding = [context.Process(target=_add, args=(path, name, n)) for name in "abcd"]
+    for process in adding:
+        process.start()
+    for process in adding:
+        process.join(120)
+    assert [process.exitcode for process in adding] == [0] * 4
     assert {r.method for r in read_rows(path)} == {f"{name} {i}" for name in "abcd" for i in range(n)}
     assert [p.name for p in tmp_path.iterdir() if not p.name.startswith(".")] == ["r.json"]
 
