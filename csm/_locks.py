@@ -47,7 +47,7 @@ def locked(path: str | os.PathLike[str], *, wait: float = WAIT) -> Iterator[None
     ...     Path(folder, ".csm.lock").exists()
     True
     """
-    lock = FileLock(_lock_file(Path(path)), fallback_to_soft=False)
+    lock = FileLock(_lock_file(Path(path)), fallback_to_soft=False, poll_interval=0.01)
     held = _acquire(lock, path, wait)
     try:
         yield

@@ -6,9 +6,11 @@ Nothing here needs PyTorch or Lightning; `csm.learning.loading` turns a data mod
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
-from csm.data.folders import Layout
+from csm._parallel import n_processes
+from csm.data.folders import FolderSet, Layout
 from csm.data.prepare import Job, Prepared, Recipe, is_prepared, prepare, prepare_mesh
 from csm.data.shapes import InMemory, Shape, ShapeSet
 from csm.data.splits import Split
@@ -26,7 +28,7 @@ class DataModule:
     train_set
         Set that the training and validation shapes come from.
     test_sets
-        Sets to test on; results call each by its name, so the names differ.
+        Sets to test on; results call each by its name, see `distinct`.
     split
         Which shapes train and which test.
     descriptor
@@ -47,7 +49,9 @@ class DataModule:
     Raises
     ------
     DataError
-        If two test sets have one name, or no training shape is left to fit.
+        If a set is there twice among the test sets, or no training shape is left to fit.
+    ConfigError
+        If `workers` is no number of processes.
     """
 
     def __init__(
@@ -63,8 +67,10 @@ class DataModule:
         workers: int | None = None,
         stencils: Sequence[Stencil] = (),
     ) -> None:
-        self.train_set, self.split, self.holdout, self.workers = train_set, split, holdout, workers
-        self.test_sets: Mapping[str, ShapeSet] = _by_name(test_sets)
+        n_processes(workers, 0)  # what is no number is refused before anything is read
+        self.train_set, *tests = distinct([train_set, *test_sets])
+        self.split, self.holdout, self.workers = split, holdout, workers
+        self.test_sets: Mapping[str, ShapeSet] = _by_name(tests)
         self.recipe = Recipe(descriptor, basis_k, tuple(stencils))
         self.store = store or Store()
         self.fit_names, held_out = split.held_out(holdout)
@@ -137,6 +143,32 @@ class DataModule:
     def validation_shapes(self) -> list[Shape]:
         """Return the meshes and truths of the validation shapes."""
         return [self.shape(name) for name in self.validation_names]
+
+
+def distinct(sets: Sequence[ShapeSet]) -> list[ShapeSet]:
+    """Return sets of which those from different folders that have one name are called by the ends of their paths.
+
+    Folders `p/meshes` and `q/meshes` become the sets "p-meshes" and "q-meshes": results and messages call sets by name.
+    """
+    roots: dict[str, list[Path]] = {}
+    for shapes in sets:
+        known = roots.setdefault(shapes.name, [])
+        if isinstance(shapes, FolderSet) and (root := shapes.root.resolve()) not in known:
+            known.append(root)
+    return [
+        replace(shapes, name=_ending(shapes, roots[shapes.name]))
+        if isinstance(shapes, FolderSet) and len(roots[shapes.name]) > 1
+        else shapes
+        for shapes in sets
+    ]
+
+
+def _ending(shapes: FolderSet, roots: Sequence[Path]) -> str:
+    """Return as much of the end of the set's path as tells it from the other folders, with its name."""
+    parts = [root.parts for root in roots]
+    n = next(n for n in range(1, 1 + max(map(len, parts))) if len({p[-n:] for p in parts}) == len(parts))
+    end = "-".join(shapes.root.resolve().parts[-n:]).replace("/", "")
+    return end if end.endswith(shapes.name) else f"{end}-{shapes.name}"
 
 
 def _by_name(sets: Sequence[ShapeSet]) -> dict[str, ShapeSet]:

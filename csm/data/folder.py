@@ -50,7 +50,8 @@ class FolderDataModule(DataModule):
         A split, or the path of a split file.  Without one, the last `n_test` shapes of the training folder are the test
         shapes.
     n_test
-        See `split`; by default a fifth of the shapes.
+        See `split`; by default a fifth of the shapes, and at least two where that leaves one to train on, because a
+        test is of pairs.
     options
         Of `csm.data.base.DataModule`.
 
@@ -76,7 +77,7 @@ class FolderDataModule(DataModule):
 def _last(train: FolderSet, n_test: int | None) -> Split:
     """Return the split whose test shapes are the last `n_test` shapes with a map."""
     names = train.mapped
-    count = max(1, len(names) // 5) if n_test is None else n_test
+    count = max(2 if len(names) > 2 else 1, len(names) // 5) if n_test is None else n_test
     if not 0 < count < len(names):
         raise DataError(
             f"{train.root}: {len(names)} shapes with known correspondence cannot be divided into training shapes and "

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 
+from csm.data._connectivity import same_connectivity, shared_mesh
 from csm.data.shapes import Shape
 from csm.errors import DataError
 from csm.mesh.correspondence import Direction, PointMap
@@ -52,7 +53,7 @@ class FirstVertices:
 
 @dataclass(frozen=True)
 class SameFaces:
-    """The map is the identity, provided that the shape has the triangles of the first shape of the set."""
+    """The map is the identity, provided that the shape has the triangles that the shapes of the set share."""
 
 
 Truth = Path | FirstVertices | SameFaces | None
@@ -193,17 +194,17 @@ class FolderSet:
         return {entry.name: entry for entry in self.entries}
 
     @cached_property
-    def _first(self) -> Mesh:
-        return read_mesh(self.entries[0].mesh)
+    def _shared(self) -> Mesh:
+        return shared_mesh(partial(read_mesh, entry.mesh, entry.name) for entry in self.entries)
 
     def _truth(self, entry: Entry, mesh: Mesh) -> PointMap:
         if isinstance(entry.truth, Path):
             return _read_map(entry.truth, mesh)
         if isinstance(entry.truth, FirstVertices):
             return self._identity(entry.truth.n, mesh)
-        if isinstance(entry.truth, SameFaces) and _same_connectivity(mesh, self._first):
+        if isinstance(entry.truth, SameFaces) and same_connectivity(mesh, self._shared):
             return self._identity(mesh.n_vertices, mesh)
-        why = "its triangles differ from those of the first shape" if entry.truth else "its map is missing"
+        why = f"its triangles differ from those of {self._shared.name}" if entry.truth else "its map is missing"
         raise DataError(
             f"{entry.mesh}: the correspondence of this shape is not known: {why}; "
             f"wanted a file corres/{entry.name}.vts (line i: the vertex, counted from 1, that is template point i)"
@@ -220,10 +221,6 @@ class FolderSet:
 
 def _read_map(path: Path, mesh: Mesh) -> PointMap:
     return read_labels(path, direction=Direction.TEMPLATE_TO_SHAPE, base=1, n_to=mesh.n_vertices)
-
-
-def _same_connectivity(a: Mesh, b: Mesh) -> bool:
-    return a.n_vertices == b.n_vertices and a.faces.shape == b.faces.shape and bool((a.faces == b.faces).all())
 
 
 def stems(files: Sequence[Path]) -> dict[str, Path]:

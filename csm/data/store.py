@@ -9,51 +9,35 @@ little time and nothing else.
 
 from __future__ import annotations
 
-import hashlib
-import json
 import logging
 import os
-import re
+import secrets
+import stat
 import time
-import zipfile
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import platformdirs
 
 from csm._types import Arrays
-from csm.errors import DataError
-from csm.mesh.io import atomic_path
+from csm.data.entries import (
+    ENTRY_NAME,
+    KINDS,
+    TEMPORARY_NAME,
+    Entry,
+    EntryError,
+    Fault,
+    entry_name,
+    is_entry,
+    read_entry,
+    write_entry,
+)
 from csm.mesh.shape import Mesh
 
-SCHEMA = 1
-"""Number of the file format; entries of another format are recomputed.
-
-Where a formula changes, the `version` of its descriptor or stencil is raised instead, which changes the keys of its own
-entries and of no others.
-"""
-
-_META = "__meta__"
-_ENTRY_NAME = re.compile(r"[0-9a-f]{40}\.npz")
 _log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class Entry:
-    """What one file of the store says of itself."""
-
-    path: Path
-    kind: str
-    shape: str
-    params: dict[str, Any]
-    schema: int
-    created: str
-    bytes: int
+_unwritable: set[Path] = set()
+"""Stores that cannot be written, which has been said once."""
 
 
 class Store:
@@ -77,20 +61,18 @@ class Store:
 
     def path(self, kind: str, mesh: Mesh, params: Mapping[str, Any]) -> Path:
         """Return the file that holds, or would hold, this entry."""
-        request = json.dumps(
-            {"schema": SCHEMA, "kind": kind, "geometry": mesh.digest, "params": dict(params)}, sort_keys=True
-        )
-        return self.root / kind / f"{hashlib.sha256(request.encode()).hexdigest()[:40]}.npz"
+        return self.root / kind / entry_name(kind, mesh.digest, params)
 
     def has(self, kind: str, mesh: Mesh, params: Mapping[str, Any]) -> bool:
-        """Tell whether the entry exists and its file is not cut off; other faults are found when it is read."""
+        """Tell whether the entry exists and is described as such; faults in its arrays are found when it is read."""
         path = self.path(kind, mesh, params)
-        return path.is_file() and zipfile.is_zipfile(path)
+        return os.path.isfile(path) and is_entry(path)
 
     def fetch(self, kind: str, mesh: Mesh, params: Mapping[str, Any], make: Callable[[], Arrays]) -> Arrays:
         """Return the entry's arrays; if there is no entry yet, compute them with `make` and keep them.
 
-        A file that is corrupt, or that another program wrote, is reported and replaced by a new entry.
+        A file that is corrupt, holds another entry, or was written by another program, is reported and replaced by a
+        new entry.  Where the store cannot be written, that is said once, and nothing is kept.
 
         Parameters
         ----------
@@ -108,36 +90,42 @@ class Store:
             return found
         arrays = make()
         self.computed += 1
-        self._write(self.path(kind, mesh, params), kind, mesh, params, arrays)
+        try:
+            write_entry(self.path(kind, mesh, params), kind, mesh, params, arrays)
+        except OSError as error:
+            self._warn_once(error)
         return arrays
 
     def read(self, kind: str, mesh: Mesh, params: Mapping[str, Any]) -> Arrays | None:
         """Return the entry's arrays if it exists and is sound, else None; parameters as of `fetch`."""
         path = self.path(kind, mesh, params)
-        if path.is_file():
-            try:
-                return read_entry(path)[1]
-            except DataError as error:
-                _log.warning("%s; computing it again", error)
+        if not os.path.lexists(path):
+            return None
+        try:
+            return read_entry(path)[1]
+        except EntryError as error:
+            _log.warning("%s; computing it again", error)
         return None
 
-    def _write(self, path: Path, kind: str, mesh: Mesh, params: Mapping[str, Any], arrays: Arrays) -> None:
-        meta = {
-            "schema": SCHEMA,
-            "kind": kind,
-            "shape": mesh.name,
-            "geometry": mesh.digest,
-            "params": dict(params),
-            "created": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
-            "versions": _versions(),
-        }
-        header = np.frombuffer(json.dumps(meta).encode(), dtype=np.uint8)
-        with atomic_path(path) as temporary, temporary.open("wb") as file:
-            np.savez(file, allow_pickle=False, **{_META: header}, **arrays)
+    def why_not_writable(self) -> str | None:
+        """Return None if entries can be written, else a sentence; a small file is written and deleted to find out."""
+        probe = self.root / f".probe.{secrets.token_hex(4)}.tmp"
+        try:
+            self.root.mkdir(parents=True, exist_ok=True)
+            probe.write_bytes(bytes(1024))
+            probe.unlink()
+        except OSError as error:
+            return _sentence(self.root, error)
+        return None
+
+    def _warn_once(self, error: OSError) -> None:
+        if self.root not in _unwritable:
+            _unwritable.add(self.root)
+            _log.warning("%s; what is computed is used, but not kept", _sentence(self.root, error))
 
     def files(self) -> list[Path]:
         """Return the files with the name of an entry, sound or not, in a fixed order; other files are not csm's."""
-        return sorted(path for path in self.root.glob("*/*.npz") if _ENTRY_NAME.fullmatch(path.name))
+        return sorted(path for path in self.root.glob("*/*.npz") if ENTRY_NAME.fullmatch(path.name))
 
     def check(self) -> tuple[list[Entry], list[str]]:
         """Read every file completely; return the sound entries and one sentence per faulty file."""
@@ -146,14 +134,15 @@ class Store:
         for path in self.files():
             try:
                 sound.append(read_entry(path)[0])
-            except DataError as error:
+            except EntryError as error:
                 faults.append(str(error))
         return sound, faults
 
     def prune(self, *, unused_days: float | None = None) -> list[Path]:
-        """Delete what cannot be used: faulty files, other schemas, and temporary files older than an hour.
+        """Delete what cannot be used: damaged and swapped files, other schemas, temporary files older than an hour.
 
-        Files without the name of an entry are never touched.
+        Files without the name of an entry are never touched, nor is a file with such a name that is sound but no entry,
+        or that cannot be read in a folder that no kind of entry has: another program may have written it.
 
         Parameters
         ----------
@@ -165,52 +154,46 @@ class Store:
         list of Path
             What was deleted.
         """
-        left_over = [path for path in self.root.glob("*/.*.tmp.npz") if _idle_seconds(path) > 3600]
+        temporary = [path for path in self.root.glob("*/.*tmp.npz") if _is_left_over(path)]
         waste = [path for path in self.files() if _is_waste(path, unused_days)]
-        for path in [*left_over, *waste]:
-            path.unlink(missing_ok=True)
-        return [*left_over, *waste]
+        return [path for path in [*temporary, *waste] if _deleted(path)]
 
 
-@cache
-def _versions() -> dict[str, str]:
-    """Return the versions of what entries are computed with; asking the installation takes 5 ms each."""
-    return {name: version(name) for name in ("csm", "numpy", "scipy")}
+def _sentence(root: Path, error: OSError) -> str:
+    why = error.strerror or str(error)
+    return f"{root}: the store cannot be written ({why}); make room or set CSM_CACHE to a folder of your own"
 
 
 def _idle_seconds(path: Path) -> float:
-    status = path.stat()
-    return time.time() - max(status.st_atime, status.st_mtime)
+    """Return for how long a file was not used; 0 if it is gone, or no file."""
+    try:
+        status = path.stat()
+    except OSError:
+        return 0.0
+    return time.time() - max(status.st_atime, status.st_mtime) if stat.S_ISREG(status.st_mode) else 0.0
+
+
+def _is_left_over(path: Path) -> bool:
+    ours = TEMPORARY_NAME.fullmatch(path.name) and KINDS.fullmatch(path.parent.name)
+    return bool(ours) and _idle_seconds(path) > 3600
 
 
 def _is_waste(path: Path, unused_days: float | None) -> bool:
-    idle = _idle_seconds(path)
+    idle = _idle_seconds(path)  # before it is read
     try:
         read_entry(path)
-    except DataError:
-        return True
+    except EntryError as error:
+        known = KINDS.fullmatch(path.parent.name) is not None
+        return error.fault is Fault.UNUSABLE or (error.fault is Fault.DAMAGED and known)
     return unused_days is not None and idle > unused_days * 86400
 
 
-def read_entry(path: Path) -> tuple[Entry, Arrays]:
-    """Read one file of a store completely, verifying its checksums.
-
-    Raises
-    ------
-    DataError
-        If the file is cut, altered, of another schema, or not an entry of a store.
-    """
+def _deleted(path: Path) -> bool:
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            arrays = {key: archive[key] for key in archive.files}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, KeyError) as error:
-        raise DataError(f"{path}: corrupt or not an entry of a csm store ({error})") from error
-    if _META not in arrays:
-        raise DataError(f"{path}: not an entry of a csm store (it has no {_META})")
-    meta = json.loads(bytes(arrays.pop(_META)))
-    if meta["schema"] != SCHEMA:
-        raise DataError(f"{path}: of schema {meta['schema']}, this version of csm writes schema {SCHEMA}")
-    entry = Entry(
-        path, meta["kind"], meta["shape"], meta["params"], meta["schema"], meta["created"], path.stat().st_size
-    )
-    return entry, arrays
+        path.unlink()
+    except FileNotFoundError:
+        return False
+    except OSError as error:
+        _log.warning("%s: cannot be deleted (%s)", path, error.strerror)
+        return False
+    return True

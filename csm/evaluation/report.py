@@ -8,11 +8,11 @@ import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass, field, fields, replace
-from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 
+from csm._locks import locked
 from csm.errors import DataError
 from csm.evaluation.provenance import Provenance
 from csm.evaluation.results import Evaluation
@@ -212,8 +212,8 @@ def read_rows(path: str | os.PathLike[str]) -> list[ResultRow]:
     """
     try:
         entries = json.loads(read_bytes(path))
-    except ValueError as error:
-        raise DataError(f"{path}: not a json file ({error})") from None
+    except (ValueError, RecursionError) as error:
+        raise DataError(f"{path}: not a json file ({error}), so nothing is added; mend it or name another") from None
     if not isinstance(entries, list):
         raise DataError(f"{path}: holds a {type(entries).__name__}, wanted a list of result rows")
     return [_row(entry, f"{path}: row {i}") for i, entry in enumerate(entries)]
@@ -232,9 +232,10 @@ def merge_rows(old: Iterable[ResultRow], new: Iterable[ResultRow]) -> list[Resul
 
 
 def add_rows(path: str | os.PathLike[str], rows: Sequence[ResultRow]) -> list[ResultRow]:
-    """Merge rows into a results file, which need not exist, and return what it holds now."""
-    merged = merge_rows(read_rows(path) if Path(path).exists() else [], rows)
-    write_rows(path, merged)
+    """Merge rows into a results file, which need not exist, and return what it holds now; processes take turns."""
+    with locked(path):
+        merged = merge_rows(read_rows(path) if os.path.lexists(path) else [], rows)
+        write_rows(path, merged)
     return merged
 
 
@@ -268,7 +269,10 @@ def _row(entry: Any, where: str) -> ResultRow:
     missing, unknown = sorted(needed - set(entry)), sorted(set(entry) - known)
     if missing or unknown:
         raise DataError(f"{where} lacks {missing or 'nothing'} and has unknown {unknown or 'nothing'}; is it older?")
-    return ResultRow(**_with_matching(entry))
+    try:
+        return ResultRow(**_with_matching(entry))
+    except (TypeError, ValueError, DataError) as error:
+        raise DataError(f"{where}: {error}") from None
 
 
 def _with_matching(entry: dict[str, Any]) -> dict[str, Any]:

@@ -3,12 +3,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from csm.commands.prepare import all_jobs
 from csm.data.folder import PLAIN, FolderDataModule
 from csm.data.registry import recognise
 from csm.data.splits import Split
 from csm.data.store import Store
 from csm.descriptors import HKS
-from csm.errors import DataError
+from csm.errors import ConfigError, DataError
 from csm.mesh.correspondence import ground_truth
 from csm.mesh.io import write_map, write_mesh
 from csm.mesh.shape import Mesh
@@ -60,8 +61,8 @@ def test_shapes_that_pairs_name_are_missed(tmp_path):
 def test_the_last_fifth_of_a_folder_is_tested_on_unless_told_otherwise(tmp_path):
     root, options = write_toys(tmp_path / "toys"), {"store": Store(tmp_path / "store"), **CHEAP}
     data = FolderDataModule(root, **options)
-    assert (data.split.name, data.split.test) == ("toys", ("toy5",))
-    assert data.split.train == ("toy0", "toy1", "toy2", "toy3", "toy4")
+    assert (data.split.name, data.split.test) == ("toys", ("toy4", "toy5"))
+    assert data.split.train == ("toy0", "toy1", "toy2", "toy3")
     assert FolderDataModule(root, n_test=3, **options).split.test == ("toy3", "toy4", "toy5")
     mine = Split("mine", ("toy5",), ("toy0",))
     assert FolderDataModule(root, split=mine, **options).split is mine
@@ -71,7 +72,7 @@ def test_another_folder_is_tested_on(tmp_path):
     root, other = write_toys(tmp_path / "toys"), write_toys(tmp_path / "others", 6, 3)
     data = FolderDataModule(root, [other], store=Store(tmp_path / "store"), **CHEAP)
     assert list(data.test_sets) == ["others"]
-    assert data.test_names(data.test_sets["others"]) == ("toy5",)
+    assert data.test_names(data.test_sets["others"]) == ("toy4", "toy5")
 
 
 @pytest.mark.parametrize("n_test", [-1, 0, 2, 3])
@@ -84,3 +85,47 @@ def test_a_split_without_training_or_test_shapes_is_refused(tmp_path, n_test):
 def test_a_single_shape_cannot_be_divided(tmp_path):
     with pytest.raises(DataError, match=r"1 shapes .* cannot be divided"):
         FolderDataModule(write_toys(tmp_path / "toys", 1), **CHEAP)
+
+
+@pytest.mark.parametrize(("n", "n_test"), [(2, 1), (3, 2), (6, 2), (14, 2), (15, 3)])
+def test_by_default_two_or_more_shapes_are_left_for_the_test(tmp_path, n, n_test):
+    """A test is of pairs; of two shapes one has to be trained on."""
+    for i in range(n):
+        write_mesh(tmp_path / f"s{i:02}.off", sphere(0))
+    data = FolderDataModule(tmp_path, **CHEAP)
+    assert (len(data.split.train), len(data.split.test)) == (n - n_test, n_test)
+
+
+def test_folders_of_one_name_are_different_sets(tmp_path):
+    """Results, and the list of what is prepared, call sets by their names."""
+    root, p, q = (write_toys(tmp_path / name / "meshes", 4) for name in ("train", "p", "q"))
+    data = FolderDataModule(root, [p, q], **CHEAP)
+    assert data.train_set.name == "train-meshes"
+    assert {name: shapes.root for name, shapes in data.test_sets.items()} == {"p-meshes": p, "q-meshes": q}
+    assert len(all_jobs(data)) == 2 + 2 * 2
+    same = FolderDataModule(root, [root], **CHEAP)
+    assert (same.train_set.name, list(same.test_sets)) == ("meshes", ["meshes"])
+
+
+def test_a_folder_that_is_there_twice_is_refused(tmp_path):
+    root = write_toys(tmp_path / "toys", 4)
+    with pytest.raises(DataError, match="only 1 different names"):
+        FolderDataModule(root, [root, tmp_path / "." / "toys"], **CHEAP)
+
+
+def test_the_first_shape_does_not_decide_alone_about_the_others(tmp_path):
+    """One that cannot be read, or has other triangles than all others, is the one that is named."""
+    root = write_toys(tmp_path / "toys", 4)
+    (root / "toy0.off").write_text("nonsense")
+    assert len(recognise(root).load("toy2").truth.indices) == 162
+    write_mesh(root / "toy0.off", blob(1))
+    shapes = recognise(root)
+    assert len(shapes.load("toy2").truth.indices) == 162
+    with pytest.raises(DataError, match=r"toy0\.off: .*triangles differ from those of toy1"):
+        shapes.load("toy0")
+
+
+@pytest.mark.parametrize("workers", ["abc", -1, True, 1.5])
+def test_workers_that_are_no_number_are_refused_before_anything_is_read(tmp_path, workers):
+    with pytest.raises(ConfigError, match="workers="):
+        FolderDataModule(write_toys(tmp_path / "toys", 3), **(CHEAP | {"workers": workers}))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import multiprocessing
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -119,13 +120,46 @@ def test_rows_inside_the_published_tables_are_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("text", "said"),
-    [("{}", "wanted a list"), ("[3]", "row 0 is a int"), ('[{"table": "4"}]', "lacks.*'age'"), ("[", "not a json")],
+    [
+        ("{}", "wanted a list"),
+        ("[3]", "row 0 is a int"),
+        ('[{"table": "4"}]', "lacks.*'age'"),
+        ("[", "not a json"),
+        ("", "not a json"),
+        ("[" * 100_000, "not a json"),
+        (json.dumps([{**asdict(row()), "seeds": 3}]), "row 0: "),
+        (json.dumps([{**asdict(row()), "age": "small"}]), "row 0: "),
+        (json.dumps([{**asdict(row()), "pairs": None}]), "row 0: "),
+        (json.dumps([{**asdict(row()), "exact_match": 1.5}]), "row 0: .*exact_match is 1.5"),
+    ],
 )
-def test_foreign_files_are_refused_by_name(tmp_path: Path, text: str, said: str) -> None:
+def test_foreign_files_are_refused_by_name_and_never_replaced(tmp_path: Path, text: str, said: str) -> None:
     path = tmp_path / "r.json"
     path.write_text(text)
     with pytest.raises(DataError, match=f"r.json.*{said}"):
         read_rows(path)
+    with pytest.raises(DataError, match=f"r.json.*{said}"):
+        add_rows(path, [row()])
+    assert path.read_text() == text
+
+
+def _add(path: str, name: str, n: int) -> None:
+    for i in range(n):
+        add_rows(path, [row(method=f"{name} {i}")])
+
+
+@pytest.mark.parametrize("n", [25, pytest.param(100, marks=pytest.mark.slow)])
+def test_processes_that_add_rows_at_once_lose_none(tmp_path: Path, n: int) -> None:
+    path = str(tmp_path / "r.json")
+    context = multiprocessing.get_context("fork")
+    adding = [context.Process(target=_add, args=(path, name, n)) for name in "abcd"]
+    for process in adding:
+        process.start()
+    for process in adding:
+        process.join(120)
+    assert [process.exitcode for process in adding] == [0] * 4
+    assert {r.method for r in read_rows(path)} == {f"{name} {i}" for name in "abcd" for i in range(n)}
+    assert [p.name for p in tmp_path.iterdir() if not p.name.startswith(".")] == ["r.json"]
 
 
 def test_a_row_averages_over_seeds() -> None:

@@ -1,4 +1,4 @@
-"""Files and folders: atomic writing, natural order, unpacking of archives."""
+"""Files and folders: reading, atomic writing, natural order."""
 
 from __future__ import annotations
 
@@ -6,11 +6,9 @@ import os
 import re
 import secrets
 import shutil
-import tarfile
-import tempfile
-import zipfile
+import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from csm.errors import DataError
@@ -43,7 +41,14 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Give a temporary name beside `path` to write to, and rename it to `path` when the block ends without an error.
 
     Readers see the old file or the whole new one, never a part.  Missing parent folders are made.  The temporary name
-    is hidden, ends like `path` (writers look at the suffix) and is removed when the block raises.
+    is hidden, ends like `path` (writers look at the suffix) and is removed when the block raises.  A file that is
+    replaced keeps its permissions; where `path` is a link, the file it points to is replaced and the link stays.
+
+    Raises
+    ------
+    DataError
+        If nothing can be written there: a read-only folder, a full disk, a name that is too long, a folder of that
+        name, a file where a folder has to be.
 
     Examples
     --------
@@ -54,14 +59,64 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     >>> (folder / "new" / "a.txt").read_text()
     'whole'
     """
+    with _writing(path, ()):
+        final, mode = _place(path)
+        final.parent.mkdir(parents=True, exist_ok=True)
+    temporary = final.with_name(_temporary_name(final))
+    with _writing(path, (final, temporary)):
+        try:
+            yield temporary
+            if mode is not None:
+                temporary.chmod(mode)
+            os.replace(temporary, final)
+        finally:
+            with suppress(OSError):
+                temporary.unlink(missing_ok=True)
+
+
+def _place(path: str | os.PathLike[str]) -> tuple[Path, int | None]:
+    """Return where `path` leads and the permissions of the file that is there, None if there is none."""
     final = Path(path)
-    final.parent.mkdir(parents=True, exist_ok=True)
-    temporary = final.with_name(f".{final.stem}.{secrets.token_hex(4)}.tmp{final.suffix}")
+    if final.is_symlink():
+        final = Path(os.path.realpath(final))
+        if final.is_symlink():
+            raise DataError(f"{path}: cannot be written: it is a link in a circle")
     try:
-        yield temporary
-        os.replace(temporary, final)
-    finally:
-        temporary.unlink(missing_ok=True)
+        mode = final.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return final, None
+    if stat.S_ISDIR(mode):
+        raise DataError(f"{path}: cannot be written: there is a folder of this name")
+    if not stat.S_ISREG(mode):
+        raise DataError(f"{path}: cannot be written: it is no file but a device, a pipe or a socket")
+    return final, stat.S_IMODE(mode)
+
+
+def _temporary_name(final: Path) -> str:
+    """Return a hidden name that ends like the file's and has at most the 255 bytes that file systems allow."""
+    suffix = final.suffix if len(os.fsencode(final.suffix)) <= 32 else ""
+    room = 255 - len(os.fsencode(f"..{secrets.token_hex(4)}.tmp{suffix}"))
+    stem = os.fsdecode(os.fsencode(final.stem)[:room])
+    return f".{stem}.{secrets.token_hex(4)}.tmp{suffix}"
+
+
+@contextmanager
+def _writing(path: str | os.PathLike[str], own: tuple[Path, ...]) -> Iterator[None]:
+    """Turn what the system says while `path` is written into one sentence; errors of other files pass, if `own`."""
+    try:
+        yield
+    except FileExistsError as error:
+        raise DataError(f"{path}: cannot be written: {error.filename} is a file, wanted a folder") from error
+    except NotADirectoryError as error:
+        raise DataError(f"{path}: cannot be written: a part of this path is a file, wanted a folder") from error
+    except OSError as error:
+        if own and error.filename is not None and Path(os.fsdecode(error.filename)) not in own:
+            raise
+        raise DataError(f"{path}: cannot be written ({error.strerror or error})") from error
+    except ValueError as error:
+        if own:
+            raise
+        raise DataError(f"{str(path)!r}: cannot be written ({error})") from error  # a name with a zero byte
 
 
 def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
@@ -97,44 +152,13 @@ def list_folders(folder: Path, depth: int = 1) -> list[Path]:
 
 
 def copy_file(source: Path, target: Path) -> None:
-    """Copy one file atomically; the source is only read."""
-    with atomic_path(target) as temporary:
-        shutil.copyfile(source, temporary)
-
-
-def unpack(archive: Path, folder: Path) -> None:
-    """Unpack a .tar (also .xz, .gz, .bz2) or .zip archive into `folder`, refusing entries that would leave it.
+    """Copy one file atomically; the source is only read.
 
     Raises
     ------
     DataError
-        If the file is no such archive, is cut short, or holds entries that point outside.
+        If the source is no file that can be read, or the target cannot be written.
     """
-    read_bytes_of_head(archive)
-    try:
-        if zipfile.is_zipfile(archive):
-            with zipfile.ZipFile(archive) as z:
-                z.extractall(folder)
-        else:
-            with tarfile.open(archive) as t:
-                t.extractall(folder, filter="data")
-    except (tarfile.TarError, zipfile.BadZipFile, EOFError, OSError, ValueError) as error:
-        why = str(error).partition("\n")[0].removesuffix(":")
-        raise DataError(f"{archive}: cannot be unpacked ({why}); wanted a whole .zip or .tar archive") from error
-
-
-@contextmanager
-def unpacked(source: Path) -> Iterator[Path]:
-    """Give a folder with the content of `source`: itself if it is a folder, else a temporary one, removed at the end.
-
-    Raises
-    ------
-    DataError
-        If `source` does not exist or is an archive that cannot be unpacked.
-    """
-    if source.is_dir():
-        yield source
-        return
-    with tempfile.TemporaryDirectory(prefix="csm-") as folder:
-        unpack(source, Path(folder))
-        yield Path(folder)
+    require_regular(source)
+    with refusals(source), source.open("rb") as original, atomic_path(target) as new, new.open("wb") as copy:
+        shutil.copyfileobj(original, copy, 1 << 20)

@@ -1,13 +1,15 @@
-import io
-import tarfile
-import zipfile
+import os
+import resource
+import signal
+import stat
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from csm.errors import DataError
-from csm.mesh.io import atomic_path, copy_file, list_files, list_folders, natural_key, read_bytes, unpack, unpacked
+from csm.mesh.io import atomic_path, copy_file, list_files, list_folders, natural_key, read_bytes, write_mesh
+from tests.shapes import blob
 
 
 def test_atomic_path_keeps_the_old_file_when_the_writer_fails(tmp_path):
@@ -33,6 +35,101 @@ def test_atomic_path_makes_folders_and_leaves_one_file(tmp_path):
         assert temporary.suffix == ".npz"
         temporary.write_bytes(b"x")
     assert [p.name for p in target.parent.iterdir()] == ["a.npz"]
+
+
+def write(path, text="new"):
+    with atomic_path(path) as temporary:
+        temporary.write_text(text)
+
+
+def test_a_link_stays_and_the_file_it_points_to_is_replaced(tmp_path):
+    (tmp_path / "real").mkdir()
+    (tmp_path / "real" / "a.txt").write_text("old")
+    (tmp_path / "link.txt").symlink_to(tmp_path / "real" / "a.txt")
+    (tmp_path / "over.txt").symlink_to("link.txt")
+    (tmp_path / "dangling.txt").symlink_to(tmp_path / "real" / "b.txt")
+    write(tmp_path / "over.txt")
+    write(tmp_path / "dangling.txt")
+    assert (tmp_path / "over.txt").is_symlink()
+    assert {p.name: p.read_text() for p in (tmp_path / "real").iterdir()} == {"a.txt": "new", "b.txt": "new"}
+
+
+def test_permissions_of_a_replaced_file_stay_and_a_new_one_has_the_usual(tmp_path):
+    (tmp_path / "a.off").write_text("old")
+    (tmp_path / "a.off").chmod(0o640)
+    write_mesh(tmp_path / "a.off", blob(1))
+    write_mesh(tmp_path / "b.off", blob(1))
+    usual = os.umask(0)
+    os.umask(usual)
+    assert stat.S_IMODE((tmp_path / "a.off").stat().st_mode) == 0o640
+    assert stat.S_IMODE((tmp_path / "b.off").stat().st_mode) == 0o666 & ~usual
+
+
+@pytest.mark.parametrize("name", ["x" * 251 + ".off", "a." + "y" * 253, "é" * 125 + ".off", "\N{GRINNING FACE}" * 62])
+def test_the_temporary_name_fits_where_the_name_fits(tmp_path, name):
+    write(tmp_path / name)
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+
+
+def test_the_temporary_of_a_hidden_or_odd_name_is_hidden(tmp_path):
+    for name in (".a", "a", "a.tar.gz", "a b.off"):
+        with atomic_path(tmp_path / name) as temporary:
+            assert temporary.name.startswith(".")
+            assert temporary.suffix == (tmp_path / name).suffix or ".tmp" in temporary.name
+            temporary.write_text("")
+
+
+REFUSED = {
+    "folder": "folder: cannot be written: there is a folder of this name",
+    "file/a.txt": "file/a.txt: cannot be written: .*is a file, wanted a folder",
+    "file/deep/a.txt": "file/deep/a.txt: cannot be written: .*is a file, wanted a folder",
+    "loop": "loop: cannot be written: it is a link in a circle",
+    "pipe": "pipe: cannot be written: it is no file",
+    "x" * 256: "x: cannot be written",
+    "a\0b": "cannot be written",
+}
+
+
+@pytest.mark.parametrize(("name", "message"), REFUSED.items())
+def test_places_that_cannot_be_written_are_named_before_anything_is_computed(tmp_path, monkeypatch, name, message):
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "loop").symlink_to("loop")
+    os.mkfifo(tmp_path / "pipe")
+    before = sorted(tmp_path.iterdir())
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(DataError, match=message):
+        write(name)
+    assert sorted(tmp_path.iterdir()) == before
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_read_only_folder_is_named(tmp_path):
+    (tmp_path / "r").mkdir(mode=0o500)
+    with pytest.raises(DataError, match=r"r/a\.txt: cannot be written \(Permission denied\)"):
+        write(tmp_path / "r" / "a.txt")
+
+
+def test_a_full_disk_is_named_and_the_old_file_stays(tmp_path):
+    """A limit on the size of files stands for the full disk: the write fails half way."""
+    (tmp_path / "a.ply").write_text("old")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+    try:
+        with pytest.raises(DataError, match=r"a\.ply: cannot be written \(File too large\)"):
+            write_mesh(tmp_path / "a.ply", blob(2))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert [p.name for p in tmp_path.iterdir()] == ["a.ply"]
+    assert (tmp_path / "a.ply").read_text() == "old"
+
+
+def test_an_error_about_another_file_inside_the_block_is_not_blamed_on_the_target(tmp_path):
+    with pytest.raises(FileNotFoundError, match="other"), atomic_path(tmp_path / "a.txt"):
+        (tmp_path / "other").read_text()
 
 
 @settings(deadline=None)
@@ -64,46 +161,6 @@ def test_list_folders_goes_down_to_depth(tmp_path):
     assert [p.name for p in list_folders(tmp_path, 3)] == ["a", "b", "c"]
 
 
-@pytest.mark.parametrize("kind", ["zip", "tar", "tar.xz", "tar.gz"])
-def test_archives_unpack(tmp_path, kind):
-    archive = tmp_path / f"set.{kind}"
-    if kind == "zip":
-        with zipfile.ZipFile(archive, "w") as z:
-            z.writestr("set/a.off", "OFF")
-    else:
-        with tarfile.open(archive, f"w:{kind[4:]}") as t:
-            info = tarfile.TarInfo("set/a.off")
-            info.size = 3
-            t.addfile(info, io.BytesIO(b"OFF"))
-    with unpacked(archive) as folder:
-        assert (folder / "set" / "a.off").read_text() == "OFF"
-    assert not folder.exists()
-
-
-def test_a_folder_is_its_own_unpacked_form_and_stays(tmp_path):
-    with unpacked(tmp_path) as folder:
-        assert folder == tmp_path
-    assert tmp_path.is_dir()
-
-
-def test_archives_may_not_write_outside(tmp_path):
-    with tarfile.open(tmp_path / "evil.tar", "w") as t:
-        info = tarfile.TarInfo("../evil.off")
-        info.size = 3
-        t.addfile(info, io.BytesIO(b"OFF"))
-    with pytest.raises(DataError, match=r"evil\.tar"):
-        unpack(tmp_path / "evil.tar", tmp_path / "inside")
-    assert not (tmp_path / "evil.off").exists()
-
-
-def test_what_is_no_archive_is_named(tmp_path):
-    (tmp_path / "a.zip").write_bytes(b"not an archive")
-    with pytest.raises(DataError, match=r"a\.zip.*wanted a whole"):
-        unpack(tmp_path / "a.zip", tmp_path)
-    with pytest.raises(DataError, match="no such file"):
-        unpack(tmp_path / "b.zip", tmp_path)
-
-
 def test_read_bytes_names_the_file(tmp_path):
     with pytest.raises(DataError, match="nowhere"):
         read_bytes(tmp_path / "nowhere")
@@ -115,3 +172,11 @@ def test_copy_file_copies_bytes(tmp_path):
     (tmp_path / "a").write_bytes(b"\0\1")
     copy_file(tmp_path / "a", tmp_path / "deep" / "b")
     assert (tmp_path / "deep" / "b").read_bytes() == b"\0\1"
+
+
+def test_copy_file_names_a_source_that_is_missing_and_a_target_that_cannot_be(tmp_path):
+    with pytest.raises(DataError, match="nowhere: there is no such file"):
+        copy_file(tmp_path / "nowhere", tmp_path / "b")
+    (tmp_path / "a").write_bytes(b"")
+    with pytest.raises(DataError, match=r"a/b: cannot be written"):
+        copy_file(tmp_path / "a", tmp_path / "a" / "b")
