@@ -21,7 +21,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     method = load_model(cfg.checkpoint)
     data, protocol = make_data(cfg, method.recipe), make_protocol(cfg)
     tested = measure_all(method, data, protocol, matching=plain(cfg.matching), table=cfg.table, device=cfg.device)
-    conclude(cfg, tested, f"{cfg.checkpoint}: {method.training['protocol']}.")
+    conclude(cfg, tested, f"{cfg.checkpoint}: {method.training.get('protocol', 'how it was trained is not known')}.")
     return numbers(tested)
 
 

@@ -43,7 +43,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     tested = measure_all(
         method, training.data, protocol, matching=plain(cfg.matching), table=cfg.table, device=cfg.device
     )
-    conclude(cfg, tested, f"{cfg.name}: {method.training['protocol']}.")
+    conclude(cfg, tested, f"{cfg.name}: {method.training.get('protocol')}.")
     if training.logger is not None:
         print(f"log:          {folder}  (tensorboard --logdir {folder})")
     return found | numbers(tested)

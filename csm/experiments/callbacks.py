@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Mapping
 from typing import Any
 
 import lightning as L
+import torch
 from torch import Tensor
 
 from csm.data.shapes import InMemory
+from csm.errors import NumericalError
 from csm.evaluation.engine import evaluate
 from csm.evaluation.protocol import EvaluationProtocol
 from csm.evaluation.results import Evaluation
@@ -59,6 +62,24 @@ class ValidationErrors(L.Callback):
         (self.latest,) = evaluate(method, shapes, self.protocol, store=loaded.data.store, workers=1, progress=False)
         pl_module.log("val/age", self.latest.summary["age"], prog_bar=True)
         pl_module.log("val/exact", self.latest.summary["exact"], prog_bar=True)
+
+
+class FiniteLoss(L.Callback):
+    """End the training at the step where the loss is no number any more."""
+
+    def on_train_batch_end(
+        self, trainer: L.Trainer, pl_module: L.LightningModule, outputs: Any, batch: Any, batch_idx: int
+    ) -> None:
+        """Look at the loss; NumericalError with epoch and shape if it is not finite."""
+        loss = outputs["loss"] if isinstance(outputs, Mapping) else outputs
+        if loss is None or bool(torch.isfinite(loss).all()):
+            return
+        rate = trainer.optimizers[0].param_groups[0]["lr"]
+        raise NumericalError(
+            f"the training has diverged: the loss is {float(loss):g} in epoch {trainer.current_epoch + 1}, step "
+            f"{batch_idx + 1} (shape {batch.name}), at a learning rate of {rate:.3g}; take a smaller optimizer.lr, or "
+            "trainer.gradient_clip_val=1"
+        )
 
 
 class EpochLines(L.Callback):

@@ -20,7 +20,7 @@ from csm.errors import ConfigError, CsmError
 from csm.evaluation.protocol import EvaluationProtocol
 from csm.evaluation.report import ResultRow, average_seeds, read_rows, write_curves_csv, write_rows
 from csm.experiments.testing import measure_set
-from csm.experiments.training import Training, fit, last_checkpoint
+from csm.experiments.training import Training, fit
 from csm.matching.base import require_device
 from csm.matching.network import NetworkMethod, load_model
 from csm.matching.registry import matchers
@@ -154,8 +154,7 @@ class Matrix:
         place, checkpoint = self._place(row), self._checkpoint(row)
         if checkpoint.exists():
             return load_model(checkpoint, row.name)
-        last = last_checkpoint(place)
-        return NetworkMethod(fit(training, place, last if last.exists() else None).module, row.name)
+        return NetworkMethod(fit(training, place).module, row.name)
 
     def _file(self, row: Row, test: str, rule: str) -> Path:
         kind = "" if rule == "nearest" else f"_{rule}"

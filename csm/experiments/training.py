@@ -3,23 +3,37 @@
 from __future__ import annotations
 
 import logging
+import signal
 import sys
+import threading
 import time
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import lightning as L
+import torch
 from lightning.pytorch.callbacks import ModelCheckpoint
 from lightning.pytorch.loggers import Logger
 
+from csm._locks import locked
+from csm._signals import saying
 from csm.data.base import DataModule
 from csm.descriptors.base import record
 from csm.errors import ConfigError
 from csm.evaluation.provenance import provenance
-from csm.experiments.callbacks import EpochLines, ValidationErrors
+from csm.experiments.callbacks import EpochLines, FiniteLoss, ValidationErrors
+from csm.experiments.resuming import (
+    AUTO,
+    RandomStates,
+    WholeCheckpoints,
+    last_checkpoint,
+    require_same_settings,
+    resume_point,
+)
 from csm.experiments.tensorboard import TensorBoardPanels
 from csm.learning.checkpoint import export_module
 from csm.learning.loading import LightningData
@@ -78,12 +92,7 @@ def default_callbacks(seed: int = 0) -> list[L.Callback]:
     return [ValidationErrors(seed=seed), TensorBoardPanels(), EpochLines()]
 
 
-def last_checkpoint(folder: Path) -> Path:
-    """Return where the last epoch of a training in this folder is kept, so that it can go on from there."""
-    return folder / "checkpoints" / "last.ckpt"
-
-
-def fit(training: Training, folder: Path, resume: Path | str | None = None) -> Trained:
+def fit(training: Training, folder: Path, resume: Path | str | None = AUTO) -> Trained:
     """Train, and save ``model.ckpt`` and ``export/`` in a folder.
 
     Parameters
@@ -93,23 +102,37 @@ def fit(training: Training, folder: Path, resume: Path | str | None = None) -> T
     folder
         Where checkpoints and logs go.
     resume
-        A checkpoint to go on from.
+        A checkpoint to go on from; "auto" for the last one in the folder if there is one; None to begin anew.
 
     Raises
     ------
     DataError
-        If training shapes cannot be used.
+        If training shapes cannot be used, or the checkpoint cannot be read.
     ConfigError
-        If the settings do not fit each other.
+        If the settings do not fit each other or those of the checkpoint, or another training works in the folder.
+    NumericalError
+        If the loss is not finite.
     """
     _quiet_lightning()
+    folder.mkdir(parents=True, exist_ok=True)
+    with locked(folder, wait=0):
+        return _fit(training, folder, resume)
+
+
+def _fit(training: Training, folder: Path, resume: Path | str | None) -> Trained:
     L.seed_everything(training.seed, workers=True, verbose=False)
     trainer = _make_trainer(training, folder)
+    begin = resume_point(folder, resume)
+    with torch.device("meta"):  # what does not fit fails before the preparation
+        sketch = make_module(training, 1, trainer.max_epochs)
+    if begin:
+        require_same_settings(begin, sketch, trainer.max_epochs)
     loaded = LightningData(training.data)
     loaded.prepare_data()
     module = make_module(training, loaded.n_features, trainer.max_epochs)
     begun = time.perf_counter()
-    trainer.fit(module, datamodule=loaded, ckpt_path=resume, weights_only=True)
+    with saying(lambda: _what_is_kept(folder, trainer)), _interruptible():
+        trainer.fit(module, datamodule=loaded, ckpt_path=begin, weights_only=True)
     seconds = time.perf_counter() - begun
     module.hparams["training"]["epochs"] = trainer.current_epoch  # fewer than asked for where max_time ended it
     checkpoint = folder / "model.ckpt"
@@ -117,6 +140,31 @@ def fit(training: Training, folder: Path, resume: Path | str | None = None) -> T
     export_module(module, folder / "export")
     measured = {key: float(value) for key, value in trainer.callback_metrics.items()}
     return Trained(module, checkpoint, seconds, measured)
+
+
+def _what_is_kept(folder: Path, trainer: L.Trainer) -> str:
+    last = last_checkpoint(folder)
+    if not last.exists():
+        return f"no epoch was finished, so nothing is kept of the training in {folder}"
+    return (
+        f"{trainer.current_epoch} of {trainer.max_epochs} epochs are done, and the last one is kept in {last}; the "
+        f"same training in the same folder (hydra.run.dir={folder}) goes on from there"
+    )
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Let Ctrl-C and SIGTERM through, which Lightning turns into the end of the process with status 1."""
+    handler = signal.getsignal(signal.SIGINT)
+    try:
+        yield
+    except SystemExit as ended:
+        if isinstance(ended.__context__, KeyboardInterrupt):
+            raise ended.__context__ from None
+        raise
+    finally:
+        if threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGINT, handler)
 
 
 def make_module(training: Training, n_features: int, epochs: int | None = None) -> CSMModule:
@@ -149,7 +197,8 @@ def _make_trainer(training: Training, folder: Path) -> L.Trainer:
         if isinstance(callback, TensorBoardPanels) and not callback.hparams:
             callback.hparams = training.settings
     trainer = training.trainer(
-        callbacks=[*training.callbacks, keep],
+        callbacks=[*training.callbacks, RandomStates(), FiniteLoss(), keep],
+        plugins=[WholeCheckpoints()],
         logger=training.logger(save_dir=folder) if training.logger else False,
         default_root_dir=folder,
         **({} if sys.stdout.isatty() else {"enable_progress_bar": False}),
@@ -168,3 +217,4 @@ def _quiet_lightning() -> None:
     logging.getLogger("lightning.fabric").setLevel(logging.WARNING)
     warnings.filterwarnings("ignore", message=r".*LeafSpec.*is deprecated")
     warnings.filterwarnings("ignore", message=r".*does not have many workers.*")
+    warnings.filterwarnings("ignore", message=r"Checkpoint directory .* exists and is not empty")

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
+from pickle import UnpicklingError
+from typing import Any
 
+import torch
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 
@@ -68,12 +72,62 @@ def load_module(path: str | os.PathLike[str]) -> CSMModule:
         raise DataError(f"{path}: not a checkpoint of csm ({why})") from error
 
 
+def read_checkpoint(path: Path) -> dict[str, Any]:
+    """Return the content of a checkpoint of ``csm train``, whose plain data has been looked at; nothing is executed.
+
+    Raises
+    ------
+    DataError
+        If there is no such file, it is damaged, or it is of another program.
+    """
+    if not path.is_file():
+        raise DataError(f"{path}: there is no such checkpoint; csm train writes model.ckpt into its output folder")
+    try:
+        found = torch.load(path, map_location="cpu", weights_only=True)
+    except UnpicklingError as error:
+        raise DataError(
+            f"{path}: not a checkpoint of csm: it holds more than numbers and plain data, and csm loads nothing that "
+            "could run code"
+        ) from error
+    except Exception as error:  # a damaged archive makes PyTorch raise whatever it trips over
+        why = (str(error) or type(error).__name__).splitlines()[0]
+        raise DataError(f"{path}: not a checkpoint of csm, or it is damaged or cut short ({why})") from error
+    if not isinstance(found, dict) or not {"state_dict", "hyper_parameters"} <= found.keys():
+        raise DataError(f"{path}: not a checkpoint of csm: it has no weights with hyper-parameters")
+    require_plain(found["hyper_parameters"], path)
+    return found
+
+
+def require_plain(hparams: Any, path: Path) -> None:
+    """Raise a DataError if hyper-parameters lack what a network is rebuilt from, or have something odd in its place."""
+    wanted: dict[str, tuple[type, ...]] = {
+        "network": (dict,),
+        "descriptor": (dict,),
+        "in_channels": (int,),
+        "n_classes": (int,),
+        "basis_k": (int,),
+    }
+    if not isinstance(hparams, Mapping):
+        raise DataError(f"{path}: not a checkpoint of csm: its hyper-parameters are a {type(hparams).__name__}")
+    for key, kinds in wanted.items():
+        value = hparams.get(key, 128 if key == "basis_k" else None)
+        if not isinstance(value, kinds) or (isinstance(value, dict) and not isinstance(value.get("name"), str)):
+            raise DataError(
+                f"{path}: not a checkpoint of csm, or it was changed: {key} is {value!r} in its hyper-parameters"
+            )
+    if not isinstance(hparams.get("training") or {}, Mapping):
+        raise DataError(f"{path}: not a checkpoint of csm, or it was changed: training is {hparams['training']!r}")
+
+
 def _load_checkpoint(path: Path) -> CSMModule:
+    read_checkpoint(path)
     return CSMModule.load_from_checkpoint(path, map_location="cpu", weights_only=True)
 
 
 def _load_export(path: Path) -> CSMModule:
-    module = CSMModule(**json.loads(read_bytes(path)))
+    hparams = json.loads(read_bytes(path))
+    require_plain(hparams, path)
+    module = CSMModule(**hparams)
     try:
         weights = load_file(path.with_name(WEIGHTS))
     except (OSError, SafetensorError) as error:

@@ -1,0 +1,140 @@
+"""Going on with a training that was stopped, as if it had not been: whole checkpoints, random states, same settings."""
+
+from __future__ import annotations
+
+import logging
+import random
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import lightning as L
+import numpy as np
+import torch
+from lightning.fabric.plugins import TorchCheckpointIO
+
+from csm.errors import ConfigError, DataError
+from csm.learning.checkpoint import read_checkpoint
+from csm.learning.module import CSMModule
+from csm.mesh.io import atomic_path
+
+_log = logging.getLogger(__name__)
+
+AUTO = "auto"
+"""Go on from the last checkpoint in the folder if there is one, else begin."""
+
+_FREE = ("in_channels", "training.epochs", "training.command", "training.commit", "training.name")  # what may differ
+_FIXED_LENGTH = ("cosine", "step", "drop", "one_cycle")  # schedules that are laid out over all epochs
+
+
+def last_checkpoint(folder: Path) -> Path:
+    """Return where the last epoch of a training in this folder is kept, so that it can go on from there."""
+    return folder / "checkpoints" / "last.ckpt"
+
+
+class WholeCheckpoints(TorchCheckpointIO):
+    """Checkpoints that are written beside their place and renamed, so that a kill leaves the one before."""
+
+    def save_checkpoint(self, checkpoint: dict[str, Any], path: Any, storage_options: Any | None = None) -> None:
+        """Write a checkpoint under a temporary name in its folder, then rename it."""
+        with atomic_path(path) as temporary:
+            torch.save(checkpoint, temporary)
+
+
+class RandomStates(L.Callback):
+    """Keep the states of all random generators in the checkpoint, and set them again when a training goes on.
+
+    The order of the shapes, the vertices drawn for the loss and dropout are then those of the training that was not
+    stopped.
+    """
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return the states of PyTorch, CUDA, NumPy and Python as tensors and plain data."""
+        kind, keys, position, has_gauss, cached = np.random.get_state()  # noqa: NPY002 - libraries use this generator
+        version, internal, gauss = random.getstate()
+        return {
+            "torch": torch.get_rng_state(),
+            "cuda": torch.cuda.get_rng_state_all() if torch.cuda.is_available() else [],
+            "numpy": [str(kind), torch.as_tensor(np.asarray(keys, dtype=np.int64)), position, has_gauss, cached],
+            "python": [version, list(internal), gauss],
+        }
+
+    def load_state_dict(self, state_dict: dict[str, Any]) -> None:
+        """Set all generators."""
+        torch.set_rng_state(state_dict["torch"].cpu())
+        if torch.cuda.is_available() and len(state_dict["cuda"]) == torch.cuda.device_count():
+            torch.cuda.set_rng_state_all([state.cpu() for state in state_dict["cuda"]])
+        kind, keys, *rest = state_dict["numpy"]
+        np.random.set_state((kind, keys.numpy().astype(np.uint32), *rest))  # noqa: NPY002
+        version, internal, gauss = state_dict["python"]
+        random.setstate((version, tuple(internal), gauss))
+
+
+def resume_point(folder: Path, resume: Path | str | None) -> Path | None:
+    """Return the checkpoint to go on from.
+
+    Parameters
+    ----------
+    folder
+        Of the training.
+    resume
+        A checkpoint; "auto" for the last one in the folder, if it is there and sound; None to begin.
+
+    Raises
+    ------
+    DataError
+        If a checkpoint that is named is missing or damaged.
+    """
+    if resume is None:
+        return None
+    if resume != AUTO:
+        read_checkpoint(Path(resume))
+        return Path(resume)
+    last = last_checkpoint(folder)
+    if not last.exists():
+        return None
+    try:
+        read_checkpoint(last)
+    except DataError as error:
+        _log.warning("%s; the training begins again", error)
+        return None
+    return last
+
+
+def require_same_settings(path: Path, module: CSMModule, epochs: int | None) -> None:
+    """Raise if a checkpoint was trained with other settings than those of a module that is to go on from it.
+
+    Parameters
+    ----------
+    path
+        The checkpoint.
+    module
+        The module that would go on.
+    epochs
+        How many epochs it is to be trained for; other numbers are refused where the schedule is laid out over them.
+
+    Raises
+    ------
+    ConfigError
+        With the settings that differ.
+    """
+    kept, wanted = (_flat(read) for read in (read_checkpoint(path)["hyper_parameters"], module.hparams))
+    differing = sorted(key for key in kept.keys() | wanted.keys() if kept.get(key) != wanted.get(key))
+    changed = [key for key in differing if key not in _FREE]
+    if module.schedule in _FIXED_LENGTH and kept.get("training.epochs") not in (None, epochs):
+        changed.append("training.epochs")
+    if changed:
+        told = "; ".join(f"{key}: {kept.get(key)} there, {wanted.get(key)} wanted" for key in changed)
+        raise ConfigError(
+            f"{path}: was trained with other settings ({told}); go on with those, or choose resume=null to begin anew"
+        )
+
+
+def _flat(node: Mapping[str, Any], above: str = "") -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in node.items():
+        if isinstance(value, Mapping):
+            found |= _flat(value, f"{above}{key}.")
+        else:
+            found[f"{above}{key}"] = list(value) if isinstance(value, tuple) else value
+    return found
