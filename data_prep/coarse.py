@@ -43,6 +43,8 @@ def chosen(mesh: Mesh, n_vertices: int, seed: int = 0) -> tuple[IntArray, IntArr
 
 def run(shapes: Path, out: Path, n_vertices: int) -> None:
     """Write the coarse copy of a folder of shapes with one connectivity."""
+    if out.exists():
+        raise FileExistsError
     found = recognise(shapes)
     first = found.mesh(found.names[0])
     vertices, faces = chosen(first, n_vertices)
@@ -62,10 +64,10 @@ def main() -> int:
     parser.add_argument("out", type=Path, help="new folder for the copy")
     parser.add_argument("--vertices", type=int, default=1000)
     given = parser.parse_args()
-    if given.out.exists():
-        parser.error(f"{given.out} exists already; choose another folder")
     try:
         run(given.shapes, given.out, given.vertices)
+    except FileExistsError:
+        parser.error(f"{given.out} exists already; choose another folder")
     except CsmError as error:
         print(f"coarse: {error}", file=sys.stderr)
         return 2

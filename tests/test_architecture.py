@@ -64,7 +64,6 @@ TESTED_ELSEWHERE = {
     "commands.main": "test_cli.py",
     "commands.match": "commands/test_pipeline.py",
     "commands.matrix": "commands/test_pipeline.py",
-    "commands.prepare": "commands/test_pipeline.py",
     "errors": "mesh/io/test_files.py",
     "mesh.io.raw": "mesh/io/test_off.py",
     "viewer.match_folder": "commands/test_pipeline.py",

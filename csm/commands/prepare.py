@@ -22,7 +22,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     if cfg.action == "check":
         return check_store(Store(cfg.store))
     if cfg.action == "prune":
-        return prune_store(Store(cfg.store), cfg.unused_days)
+        return prune_store(Store(cfg.store), _days(cfg.unused_days))
     if cfg.action != "fill":
         raise ConfigError(f"action={cfg.action}: wanted fill, check or prune")
     data = make_data(cfg)
@@ -42,8 +42,10 @@ def all_jobs(data: DataModule) -> list[Job]:
 
 
 def fill_store(data: DataModule, jobs: list[Job], workers: int | None) -> Summary:
-    """Prepare the shapes and print an account."""
+    """Prepare the shapes and print an account; DataError, before any work, if the store cannot be written."""
     root = data.store.root
+    if why := data.store.why_not_writable():
+        raise DataError(why)
     print(f"preparing {len(jobs)} shapes into {root} ({_gigabytes(_existing(root))} GB free there)")
     summary = prepare(jobs, [data.recipe], data.store, workers=workers)
     print(
@@ -61,7 +63,8 @@ def check_store(store: Store) -> dict[str, Any]:
         print(f"{kind:<12} {len(entries):>6} entries  {sum(e.bytes for e in entries) / 1e6:>10.1f} MB")
     if faults:
         raise DataError(
-            f"{len(faults)} faulty files in {store.root} (csm prepare action=prune deletes them):\n" + "\n".join(faults)
+            f"{len(faults)} faulty files in {store.root}; what is needed of them is computed again, and csm prepare "
+            "action=prune deletes those that csm wrote:\n" + "\n".join(faults)
         )
     print(f"{store.root}: {len(sound)} entries, all sound")
     return {"entries": len(sound), "bytes": sum(entry.bytes for entry in sound)}
@@ -74,6 +77,12 @@ def prune_store(store: Store, unused_days: float | None) -> dict[str, Any]:
         print(f"deleted {path}")
     print(f"{store.root}: {len(gone)} files deleted")
     return {"deleted": len(gone)}
+
+
+def _days(value: Any) -> float | None:
+    if value is None or (isinstance(value, (int, float)) and not isinstance(value, bool) and 0 <= value < float("inf")):
+        return value
+    raise ConfigError(f"unused_days={value}: wanted a number of days from 0, or null to keep sound entries of any age")
 
 
 def _existing(folder: Any) -> Any:

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import argparse
+import filecmp
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from csm._locks import locked
+from csm._signals import exit_status, terminable
 from csm.data.folders import FolderSet, Layout
 from csm.data.inspection import Inspected, inspect
 from csm.data.prepare import Job, Recipe, Summary, prepare
@@ -37,7 +42,9 @@ class Unpacked:
         return "\n".join([head, *bad])
 
 
-def unpack(source: Path, out: Path, layouts: Sequence[Layout], progress: bool = True) -> list[Unpacked]:
+def unpack(
+    source: Path, out: Path, layouts: Sequence[Layout], progress: bool = True, *, overwrite: bool = False
+) -> list[Unpacked]:
     """Copy every set in one of the wanted layouts from an archive or folder to `out/NAME`, and check the copy.
 
     Parameters
@@ -50,27 +57,54 @@ def unpack(source: Path, out: Path, layouts: Sequence[Layout], progress: bool = 
         The wanted layouts.
     progress
         Show a progress bar with the shape's name.
+    overwrite
+        Replace files in `out/NAME` that differ, such as those that were edited after an earlier run.
 
     Raises
     ------
     DataError
-        If the source holds no set in these layouts, or `out/NAME` is the source itself.
+        If the source holds no set in these layouts or cannot be unpacked, `out/NAME` is the source itself, or files
+        there differ from the source's.
     """
-    with unpacked(source) as folder:
+    with _content(source) as folder:
         found = [shapes for shapes in find_sets(folder) if shapes.layout in layouts]
         if not found:
             raise DataError(f"{source}: holds no {_any_of(layouts)}. Where to get it: {_origins(layouts)}")
-        placed = [lay_out(shapes, out / shapes.name) for shapes in found]
+        placed = [lay_out(shapes, out / shapes.name, overwrite=overwrite) for shapes in found]
     return [Unpacked(shapes, inspect(shapes, progress)) for shapes in placed]
 
 
-def lay_out(shapes: FolderSet, target: Path) -> FolderSet:
+@contextmanager
+def _content(source: Path) -> Iterator[Path]:
+    """Give the folder that a source is unpacked to; whatever is wrong with an archive is a DataError that names it."""
+    with ExitStack() as stack:
+        try:
+            folder = stack.enter_context(unpacked(source))
+        except CsmError:
+            raise
+        except Exception as error:  # unpackers raise what they like at a damaged, encrypted or oddly packed member
+            raise DataError(f"{source}: cannot be unpacked ({error}); wanted a whole .zip or .tar archive") from error
+        yield folder
+
+
+def lay_out(shapes: FolderSet, target: Path, *, overwrite: bool = False) -> FolderSet:
     """Copy the files of a set to a folder, in the same layout, and return the set that is recognised there.
+
+    Files that are there already and are the same are left alone.  Processes that lay out in one folder take turns.
+
+    Parameters
+    ----------
+    shapes
+        The set as published.
+    target
+        The folder.
+    overwrite
+        Replace files that are there and differ.
 
     Raises
     ------
     DataError
-        If `target` lies in the set's own folder or the set has no shapes.
+        If `target` lies in the set's own folder, the set has no shapes, or files that are there differ.
     """
     if target.resolve().is_relative_to(shapes.root.resolve()):
         raise DataError(
@@ -78,9 +112,28 @@ def lay_out(shapes: FolderSet, target: Path) -> FolderSet:
         )
     if not shapes.entries:
         raise DataError(f"{shapes.root}: this {shapes.layout.title} folder has no shapes; {shapes.layout.origin}")
-    for path in shapes.files:
-        copy_file(path, target / path.relative_to(shapes.root))
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with locked(target.parent, wait=600):
+        pairs = [(path, target / path.relative_to(shapes.root)) for path in shapes.files]
+        changes = [(path, new) for path, new in pairs if not _same(path, new)]
+        differ = [new for _, new in changes if os.path.lexists(new)]
+        if differ and not overwrite:
+            raise DataError(_refusal(shapes, target, differ))
+        for path, new in changes:
+            copy_file(path, new)
     return recognise(target)
+
+
+def _same(a: Path, b: Path) -> bool:
+    return b.is_file() and filecmp.cmp(a, b, shallow=False)
+
+
+def _refusal(shapes: FolderSet, target: Path, differ: Sequence[Path]) -> str:
+    shown = ", ".join(str(path.relative_to(target)) for path in differ[:5]) + (", ..." if len(differ) > 5 else "")
+    return (
+        f"{target}: {len(differ)} of {len(shapes.files)} files are there already and differ from the source's "
+        f"({shown}); nothing was written; --overwrite replaces them, or choose another --out"
+    )
 
 
 def fill_store(shapes: FolderSet, store: Store) -> Summary:
@@ -106,7 +159,8 @@ def script(title: str, layouts: Sequence[Layout], argv: Sequence[str] | None = N
     Returns
     -------
     int
-        Exit status: 0, 1 if some shape cannot be used or prepared, 2 after an error that the user can mend.
+        Exit status: 0, 1 if some shape cannot be used or prepared, 2 after an error that the user can mend, 130 or 143
+        if it was stopped.
     """
     parser = argparse.ArgumentParser(
         description=title,
@@ -115,15 +169,31 @@ def script(title: str, layouts: Sequence[Layout], argv: Sequence[str] | None = N
     parser.add_argument("source", nargs="+", type=Path, help="archives (.zip, .tar.xz, ...) or folders as published")
     parser.add_argument("--out", type=Path, required=True, help="folder that gets one folder per set")
     parser.add_argument("--store", action="store_true", help="also compute the paper's descriptors and bases")
+    parser.add_argument("--overwrite", action="store_true", help="replace files in --out that differ from the source's")
     options = parser.parse_args(argv)
     try:
-        unpacked_sets = [found for source in options.source for found in unpack(source, options.out, layouts)]
-        for found in unpacked_sets:
-            print(found)
-        filled = [fill_store(found.shapes, Store()) for found in unpacked_sets if options.store]
+        with terminable():
+            return _run(options, layouts)
     except CsmError as error:
         print(f"{parser.prog}: {error}", file=sys.stderr)
         return 2
+    except OSError as error:
+        print(f"{parser.prog}: {error.filename or options.out}: {error.strerror or error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt as stop:
+        print(f"{parser.prog}: stopped: {str(stop) or 'run the same command again to go on'}", file=sys.stderr)
+        return exit_status(stop)
+
+
+def _run(options: argparse.Namespace, layouts: Sequence[Layout]) -> int:
+    unpacked_sets = [
+        found
+        for source in options.source
+        for found in unpack(source, options.out, layouts, overwrite=options.overwrite)
+    ]
+    for found in unpacked_sets:
+        print(found)
+    filled = [fill_store(found.shapes, Store()) for found in unpacked_sets if options.store]
     for summary in filled:
         print(f"{summary.made} prepared, {summary.present} already in the store, {len(summary.failures)} failed")
         print(summary.table(), end="\n" if summary.failures else "")

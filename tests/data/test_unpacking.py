@@ -1,5 +1,7 @@
+import multiprocessing
 import shutil
 import tarfile
+import zipfile
 
 import pytest
 
@@ -91,3 +93,84 @@ def test_unpacking_twice_gives_the_same(tmp_path):
     assert contents(tmp_path / "out") == first
     shutil.rmtree(tmp_path / "in")
     assert recognise(tmp_path / "out" / "TOSCA_5k_remeshed").load("cat0").truth.n_from == 30
+
+
+def test_an_edited_file_is_not_overwritten_without_a_word(tmp_path, capsys):
+    layouts.sga18(tmp_path / "in")
+    unpack(tmp_path / "in", tmp_path / "out", [SGA18], progress=False)
+    root = tmp_path / "out" / "TOSCA_5k_remeshed"
+    first = contents(root)
+    (root / "vtx_5k" / "corres" / "dog0.vts").unlink()
+    edited = root / "vtx_5k" / "cat0.off"
+    write_mesh(edited, blob(1))
+    mine = edited.read_bytes()
+    arguments = [str(tmp_path / "in"), "--out", str(tmp_path / "out")]
+    assert script("A title.", [SGA18], arguments) == 2
+    said = capsys.readouterr().err
+    assert "1 of 10 files are there already and differ from the source's (vtx_5k/cat0.off)" in said
+    assert "--overwrite" in said
+    assert edited.read_bytes() == mine
+    assert not (root / "vtx_5k" / "corres" / "dog0.vts").exists()
+    assert script("A title.", [SGA18], [*arguments, "--overwrite"]) == 0
+    assert contents(root) == first
+
+
+def test_files_that_are_the_same_are_not_written_again(tmp_path):
+    layouts.sga18(tmp_path / "in")
+    unpack(tmp_path / "in", tmp_path / "out", [SGA18], progress=False)
+    times = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("*.off")}
+    unpack(tmp_path / "in", tmp_path / "out", [SGA18], progress=False, overwrite=True)
+    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("*.off")} == times
+
+
+def test_an_out_that_is_a_file_is_one_sentence(tmp_path, capsys):
+    layouts.sga18(tmp_path / "in")
+    (tmp_path / "file").write_text("mine")
+    assert script("A title.", [SGA18], [str(tmp_path / "in"), "--out", str(tmp_path / "file")]) == 2
+    assert str(tmp_path / "file") in capsys.readouterr().err
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+@pytest.mark.parametrize("offset", [8, 6])
+def test_an_archive_of_unknown_packing_is_one_sentence(tmp_path, capsys, offset):
+    """The first member's compression method, or its flag for encryption, is another."""
+    layouts.sga18(tmp_path / "in")
+    with zipfile.ZipFile(tmp_path / "set.zip", "w") as archive:
+        for path in sorted((tmp_path / "in").rglob("*.off")):
+            archive.write(path, path.relative_to(tmp_path))
+    content = bytearray((tmp_path / "set.zip").read_bytes())
+    content[content.index(b"PK\x01\x02") + offset + 2] = 97
+    (tmp_path / "set.zip").write_bytes(content)
+    assert script("A title.", [SGA18], [str(tmp_path / "set.zip"), "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert "set.zip: cannot be unpacked" in said
+    assert said.count("\n") == 1
+
+
+def _unpack(source, out) -> None:
+    unpack(source, out, [SGA18], progress=False)
+
+
+def test_two_scripts_at_once_do_no_harm(tmp_path):
+    layouts.sga18(tmp_path / "in")
+    context = multiprocessing.get_context("fork")
+    both = [context.Process(target=_unpack, args=(tmp_path / "in", tmp_path / "out")) for _ in range(2)]
+    for process in both:
+        process.start()
+    for process in both:
+        process.join(60)
+    assert [process.exitcode for process in both] == [0, 0]
+    _unpack(tmp_path / "in", tmp_path / "alone")
+    name = "TOSCA_5k_remeshed"
+    assert contents(tmp_path / "out" / name) == contents(tmp_path / "alone" / name)
+
+
+def test_a_stopped_script_says_how_to_go_on(tmp_path, capsys, monkeypatch):
+    layouts.sga18(tmp_path / "in")
+
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("csm.data.unpacking.inspect", stopped)
+    assert script("A title.", [SGA18], [str(tmp_path / "in"), "--out", str(tmp_path / "out")]) == 130
+    assert "stopped: run the same command again" in capsys.readouterr().err
