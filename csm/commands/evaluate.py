@@ -7,8 +7,10 @@ from typing import Any
 from omegaconf import DictConfig
 
 from csm.commands.app import command
-from csm.commands.groups import make_data, make_protocol, plain
+from csm.commands.groups import make_data, make_protocol, matching_of
+from csm.commands.outputs import require_results
 from csm.commands.train import conclude
+from csm.data.inspection import require_sound
 from csm.errors import ConfigError
 from csm.experiments.testing import measure_all, numbers
 from csm.matching.network import load_model
@@ -19,8 +21,10 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     if cfg.checkpoint is None:
         raise ConfigError("evaluate needs checkpoint=PATH, a .ckpt that csm train wrote")
     method = load_model(cfg.checkpoint)
-    data, protocol = make_data(cfg, method.recipe), make_protocol(cfg)
-    tested = measure_all(method, data, protocol, matching=plain(cfg.matching), table=cfg.table, device=cfg.device)
+    data, protocol, matching = make_data(cfg, method.recipe), make_protocol(cfg), matching_of(cfg)
+    require_results(cfg.results)
+    require_sound(data, exact=protocol.distance == "exact" and not protocol.fallback, train=False)
+    tested = measure_all(method, data, protocol, matching=matching, table=cfg.table, device=cfg.device)
     conclude(cfg, tested, f"{cfg.checkpoint}: {method.training.get('protocol', 'how it was trained is not known')}.")
     return numbers(tested)
 

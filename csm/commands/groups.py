@@ -134,7 +134,21 @@ def make_data(cfg: DictConfig, recipe: Recipe | None = None) -> DataModule:
         store=Store(cfg.store),
         workers=cfg.workers,
     )
+    if cfg.get("clean") == "auto":
+        from csm.data.cleaned import CleanedSet
+
+        data.train_set = CleanedSet(data.train_set)
+        data.test_sets = {name: CleanedSet(shapes) for name, shapes in data.test_sets.items()}
     return data
+
+
+def matching_of(cfg: DictConfig) -> list[str]:
+    """Return the names of the matchers, also where a single one was given without brackets; ConfigError if unknown."""
+    from csm.matching.registry import matchers
+
+    names = [cfg.matching] if isinstance(cfg.matching, str) else list(plain(cfg.matching) or [])
+    matchers(names)
+    return names
 
 
 def make_protocol(cfg: DictConfig) -> EvaluationProtocol:

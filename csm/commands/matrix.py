@@ -11,7 +11,7 @@ from hydra import compose
 from omegaconf import DictConfig, open_dict
 
 from csm.commands.app import command
-from csm.commands.groups import make_protocol, plain
+from csm.commands.groups import make_protocol, matching_of, plain
 from csm.commands.schema import require_valid
 from csm.commands.train import make_training, require_network_of_recipe
 from csm.errors import ConfigError
@@ -38,7 +38,7 @@ def _kind(row: ResultRow) -> str:
 def fill(cfg: DictConfig, rows: Sequence[Row]) -> list[ResultRow]:
     """Fill the cells of these rows, print the table and return its averaged rows."""
     matrix = Matrix(
-        Path(cfg.folder), make_protocol(cfg), tuple(plain(cfg.matching)), str(cfg.table), cfg.train, cfg.device
+        Path(cfg.folder), make_protocol(cfg), tuple(matching_of(cfg)), str(cfg.table), cfg.train, cfg.device
     )
     table = matrix.fill(rows)
     print(markdown_table(table))

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from csm.errors import ConfigError
+from csm.evaluation.report import read_rows
 
 _OVERWRITE = "give another out=, or overwrite=true to replace it"
 
@@ -68,6 +69,22 @@ def _identity(path: Path) -> Any:
     except OSError:
         return os.path.realpath(path)
     return found.st_dev, found.st_ino
+
+
+def require_results(results: str | None) -> None:
+    """Raise before the work if result rows cannot be added to a file.
+
+    Raises
+    ------
+    ConfigError, csm.errors.DataError
+        If the place cannot be written, or the file that is there holds something else.
+    """
+    if results is None:
+        return
+    path = Path(results)
+    require_file_place(path, "results")
+    if path.exists():
+        read_rows(path)
 
 
 def digest(path: Path) -> str:

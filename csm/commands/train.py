@@ -11,7 +11,9 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig
 
 from csm.commands.app import command, output_folder
-from csm.commands.groups import make_data, make_protocol, plain, register
+from csm.commands.groups import make_data, make_protocol, matching_of, plain, register
+from csm.commands.outputs import require_results
+from csm.data.inspection import require_sound
 from csm.errors import ConfigError
 from csm.evaluation.tables import markdown_table
 from csm.experiments.report import write_results
@@ -19,7 +21,6 @@ from csm.experiments.testing import Tested, measure_all, numbers
 from csm.experiments.training import Training, fit
 from csm.matching.base import require_device
 from csm.matching.network import NetworkMethod
-from csm.matching.registry import matchers
 
 register("data", "descriptor", "model")
 
@@ -31,18 +32,17 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     """Train and, unless ``test=false``, test; return the numbers of the job."""
     folder = output_folder()
     require_network_of_recipe(cfg, HydraConfig.get().overrides.task)
-    training, protocol = make_training(cfg), make_protocol(cfg)
-    matchers(plain(cfg.matching))  # what the test wants is checked before the training
+    training, protocol, matching = make_training(cfg), make_protocol(cfg), matching_of(cfg)
     require_device(cfg.device)
+    require_results(cfg.results)
+    require_sound(training.data, test=cfg.test, exact=protocol.distance == "exact" and not protocol.fallback)
     trained = fit(training, folder, cfg.resume)
     print(f"trained for {trained.seconds / 60:.1f} minutes: {trained.checkpoint}")
     found = {"seconds": trained.seconds, "checkpoint": str(trained.checkpoint), **trained.measured}
     if not cfg.test:
         return found
     method = NetworkMethod(trained.module)
-    tested = measure_all(
-        method, training.data, protocol, matching=plain(cfg.matching), table=cfg.table, device=cfg.device
-    )
+    tested = measure_all(method, training.data, protocol, matching=matching, table=cfg.table, device=cfg.device)
     conclude(cfg, tested, f"{cfg.name}: {method.training.get('protocol')}.")
     if training.logger is not None:
         print(f"log:          {folder}  (tensorboard --logdir {folder})")

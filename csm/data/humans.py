@@ -184,6 +184,8 @@ class HumansSet:
     store_root: str | None = None
     seed: int = 0
 
+    built_in: ClassVar[bool] = True
+
     @classmethod
     def parse(cls, text: str, store_root: str | None = None) -> HumansSet:
         """Make a set from its short name: "original", "refined_10000", "remeshed_5000".

@@ -92,7 +92,9 @@ def inspect(shapes: FolderSet, progress: bool = True) -> tuple[Inspected, ...]:
     return _of_one_length(rows, shapes, shapes.templates)
 
 
-def data_problems(data: DataModule, *, test: bool = True, progress: bool = True) -> tuple[Problem, ...]:
+def data_problems(
+    data: DataModule, *, train: bool = True, test: bool = True, progress: bool = True
+) -> tuple[Problem, ...]:
     """Read every shape that a data module trains and tests on, and return what would fail; nothing is raised for it.
 
     The training shapes stay in memory, as they do for the training.
@@ -101,24 +103,26 @@ def data_problems(data: DataModule, *, test: bool = True, progress: bool = True)
     ----------
     data
         The data module.
-    test
-        Also look at the test shapes, and whether the split leaves a pair of them in every test set.
+    train, test
+        Look at the training shapes; at the test shapes, and whether the split leaves a pair of them in every test set.
     progress
         Show a progress bar with the shape's name.
     """
-    found = _part_problems(data.train_set, data.train_names, data.shape, progress)
+    found = _part_problems(data.train_set, data.train_names, data.shape, progress) if train else []
     for shapes in data.test_sets.values() if test else ():
         found += _part_problems(shapes, lambda s=shapes: data.test_names(s), shapes.load, progress)  # type: ignore[misc]
         found += _pair_problems(shapes, data)
     return tuple(found)
 
 
-def require_sound(data: DataModule, *, test: bool = True, exact: bool = False, progress: bool = True) -> None:
+def require_sound(
+    data: DataModule, *, train: bool = True, test: bool = True, exact: bool = False, progress: bool = True
+) -> None:
     """Raise what `data_problems` finds, so that an experiment fails before its expensive part and not after it.
 
     Parameters
     ----------
-    data, test, progress
+    data, train, test, progress
         As of `data_problems`.
     exact
         The test measures exact geodesic distances, which it cannot on every mesh.
@@ -128,7 +132,7 @@ def require_sound(data: DataModule, *, test: bool = True, exact: bool = False, p
     DataError
         If there is an error; lists the first ten.
     """
-    problems = data_problems(data, test=test, progress=progress)
+    problems = data_problems(data, train=train, test=test, progress=progress)
     wrong = [p for p in problems if p.severity == "error" or (exact and test and p.kind == "not_exact")]
     if wrong:
         more = [f"... and {len(wrong) - 10} more"] if len(wrong) > 10 else []
@@ -179,7 +183,8 @@ def _map_file(shapes: ShapeSet, name: str) -> str:
 
 
 def _mesh_file(shapes: ShapeSet, name: str) -> str:
-    return str(shapes.entry(name).mesh) if isinstance(shapes, FolderSet) else ""
+    inner = getattr(shapes, "shapes", shapes)  # of a set that is cleaned when it is read
+    return str(inner.entry(name).mesh) if isinstance(inner, FolderSet) else ""
 
 
 def _part_problems(
@@ -189,6 +194,8 @@ def _part_problems(
         wanted = list(names())
     except CsmError as error:
         return [Problem(shapes.name, "", "", "missing", "error", str(error))]
+    if getattr(shapes, "built_in", False):
+        return []  # made by csm, and to make finer ones takes its time
     with progress_bar(wanted, desc=f"check {shapes.name}", unit="shape", disable=not progress) as bar:
         rows = []
         for name in bar:

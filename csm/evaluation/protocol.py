@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import logging
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Integral
@@ -14,7 +15,11 @@ from csm._types import BoolArray, IntArray
 from csm.errors import ConfigError, DataError
 from csm.evaluation.metrics import FLIP_MARGIN
 from csm.mesh.correspondence import PointMap
+from csm.mesh.shape import Mesh
 from csm.operators.geodesic import Method as Distance
+from csm.operators.geodesic import can_be_exact
+
+_log = logging.getLogger(__name__)
 
 Normaliser: TypeAlias = Literal["diameter", "sqrt_area"]
 Pair: TypeAlias = tuple[str, str]
@@ -78,6 +83,9 @@ class EvaluationProtocol:
     exact_points
         How many template points are measured exactly on each target, the others along edges and scaled (see
         `csm.evaluation.distances`); None for all.
+    fallback
+        Kind of distance on targets that are no manifold, where exact ones cannot be measured: "heat" or "edge"; None
+        refuses such targets.
     drawn
         Which points are drawn: "template", the same ones of the template in every pair; or "pair", among those that the
         two shapes have in common and that a perturbation has left.
@@ -91,15 +99,17 @@ class EvaluationProtocol:
     normaliser: Normaliser = "diameter"
     exact_points: int | None = None
     drawn: Literal["template", "pair"] = "template"
+    fallback: Literal["heat", "edge"] | None = None
 
     def __post_init__(self) -> None:
         for what, value, known in (
             ("distance", self.distance, get_args(Distance)),
             ("normaliser", self.normaliser, get_args(Normaliser)),
             ("drawn", self.drawn, ("template", "pair")),
+            ("fallback", self.fallback, (None, "heat", "edge")),
         ):
             if value not in known:
-                raise ConfigError(f"protocol: {what}={value!r} is unknown; choose one of {', '.join(known)}")
+                raise ConfigError(f"protocol: {what}={value!r} is unknown; choose one of {', '.join(map(str, known))}")
         if isinstance(self.pairs, str) and self.pairs != "all":
             raise ConfigError(f'protocol: pairs={self.pairs!r} is unknown; wanted "all" or a list of name pairs')
         if not isinstance(self.pairs, str):
@@ -116,6 +126,13 @@ class EvaluationProtocol:
                 f"protocol: exact_points={self.exact_points} are drawn on the template, so points={self.points} have "
                 "to be as well: drawn=template"
             )
+
+    def distance_on(self, mesh: Mesh) -> Distance:
+        """Return the kind of distance on a target: `distance`, or `fallback` where that cannot be measured."""
+        if self.fallback is None or self.distance != "exact" or can_be_exact(mesh):
+            return self.distance
+        _log.warning("%s: is no manifold, so its distances are measured by the method %r", mesh.label, self.fallback)
+        return self.fallback
 
     def choose(self, names: Sequence[str], templates: Mapping[str, str] | None = None) -> list[Pair]:
         """Return the (source, target) pairs to evaluate among shapes of these names.
@@ -231,5 +248,8 @@ class EvaluationProtocol:
             f"target from the true to the matched vertex, divided by the {_NORMALISERS[self.normaliser]}; "
             f"mean over {self._points()}{scaled}, pooled over pairs; a match on "
             f"another component counts as one diameter; left-right flip: nearer to the mirrored truth "
-            f"by more than {FLIP_MARGIN:g}."
+            f"by more than {FLIP_MARGIN:g}." + self._instead()
         )
+
+    def _instead(self) -> str:
+        return f" On targets that are no manifold: {_DISTANCES[self.fallback]}." if self.fallback else ""

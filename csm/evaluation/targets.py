@@ -235,8 +235,9 @@ def measure_target(task: TargetTask) -> Found:
 def _errors(task: TargetTask, matches: Matches) -> dict[Cell, list[PairErrors]]:
     """Measure the points of all cells together, because most are the same, and store the results."""
     plan, together = task.plan, [points for of_cell in matches.points.values() for points in of_cell.values()]
-    memo = plan.store if plan.protocol.distance == "exact" else None
-    measured = target_errors(matches.mesh, together, plan.protocol.distance, plan.protocol.normaliser, memo)
+    distance = plan.protocol.distance_on(matches.mesh)
+    memo = plan.store if distance == "exact" else None
+    measured = target_errors(matches.mesh, together, distance, plan.protocol.normaliser, memo)
     errors = iter(measured.errors)
     found = {}
     for cell, of_cell in matches.points.items():
@@ -280,6 +281,8 @@ def _digest_of_change(changed: Damaged) -> str:
 def _key(plan: Plan, cell: Cell, maps: str, changed: Damaged | None) -> dict[str, Any]:
     """Return the cache key of a cell on one target: everything that its result depends on."""
     asked = {name: value for name, value in asdict(plan.protocol).items() if name not in ("pairs", "sample")}
+    if asked["fallback"] is None:
+        del asked["fallback"]  # results from before there was one stay valid
     return {
         "method": dict(plan.methods[cell.method].key),
         "matcher": {"name": cell.matcher, **plan.matchers[cell.matcher].parameters()},

@@ -15,8 +15,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from csm._locks import locked
+from csm._signals import saying
+from csm.data.inspection import require_sound
 from csm.data.store import Store
-from csm.errors import ConfigError, CsmError
+from csm.errors import ConfigError, CsmError, DataError
 from csm.evaluation.protocol import EvaluationProtocol
 from csm.evaluation.report import ResultRow, average_seeds, read_rows, write_curves_csv, write_rows
 from csm.experiments.testing import measure_set
@@ -24,7 +27,7 @@ from csm.experiments.training import Training, fit
 from csm.matching.base import require_device
 from csm.matching.network import NetworkMethod, load_model
 from csm.matching.registry import matchers
-from csm.mesh.io import atomic_path
+from csm.mesh.io import atomic_path, read_bytes
 
 _log = logging.getLogger(__name__)
 
@@ -90,6 +93,12 @@ class Matrix:
         """
         matchers(self.matching)
         require_device(self.device)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        kept = f"finished cells are kept in {self.folder}; the same command goes on with the others"
+        with locked(self.folder, wait=0), saying(lambda: kept):
+            return self._fill(rows)
+
+    def _fill(self, rows: Iterable[Row]) -> list[ResultRow]:
         found: list[ResultRow] = []
         failures: list[str] = []
         for row in rows:
@@ -153,7 +162,12 @@ class Matrix:
         """Return the trained network of a row: the one in the folder, or trained now."""
         place, checkpoint = self._place(row), self._checkpoint(row)
         if checkpoint.exists():
-            return load_model(checkpoint, row.name)
+            try:
+                return load_model(checkpoint, row.name)
+            except DataError as error:
+                _log.warning("%s; it is trained again", error)
+        exact = self.protocol.distance == "exact" and not self.protocol.fallback
+        require_sound(training.data, exact=exact, progress=False)
         return NetworkMethod(fit(training, place).module, row.name)
 
     def _file(self, row: Row, test: str, rule: str) -> Path:
@@ -163,7 +177,11 @@ class Matrix:
     def _kept(self, path: Path) -> ResultRow | None:
         if not path.exists():
             return None
-        (row,) = read_rows(path)
+        try:
+            (row,) = read_rows(path)
+        except (DataError, ValueError) as error:
+            _log.warning("%s: is damaged (%s); it is measured again", path, error)
+            return None
         if row.protocol == self.protocol.describe(row.pairs):
             return replace(row, table=self.table)  # a matrix that shares the folder may have measured it
         _log.warning("%s answers another protocol (%s); it is computed again", path, row.protocol)
@@ -185,7 +203,13 @@ def require_same_training(folder: Path, identity: Mapping[str, Any]) -> None:
         with atomic_path(path) as temporary:
             temporary.write_text(json.dumps(wanted, indent=1) + "\n", encoding="utf-8")
         return
-    kept = _comparable(json.loads(path.read_text(encoding="utf-8")))
+    try:
+        kept = _comparable(json.loads(read_bytes(path)))
+    except (ValueError, TypeError, AttributeError, RecursionError) as error:
+        _log.warning("%s: is damaged (%s); it is written again, from the settings that are wanted", path, error)
+        path.unlink()
+        require_same_training(folder, identity)
+        return
     changed = [
         f"{key}: {kept.get(key)} there, {wanted.get(key)} wanted"
         for key in sorted({*kept, *wanted})

@@ -212,15 +212,25 @@ class _Edge(_OnMesh):
         return row
 
 
-def _require_window_propagation(mesh: Mesh) -> None:
+def can_be_exact(mesh: Mesh) -> bool:
+    """Tell whether exact distances can be measured on a mesh: it is a manifold, and no edge has length zero."""
+    return not _against_window_propagation(mesh)
+
+
+def _against_window_propagation(mesh: Mesh) -> list[str]:
     problems = [
         f"{f.text} ({f.count})" for f in check(mesh) if f.kind in ("non_manifold_edges", "non_manifold_vertices")
     ]
     heads, tails = mesh.corners, mesh.corners[:, [1, 2, 0]]
     if (no_length := (heads == tails).all(axis=2)).any():
         problems.append(f"edges of no length ({int(no_length.sum())})")
+    return problems
+
+
+def _require_window_propagation(mesh: Mesh) -> None:
+    problems = _against_window_propagation(mesh)
     if problems:
         raise MeshError(
-            f"{mesh.label}: exact geodesics need a manifold, but there are {'; '.join(problems)}; mend the mesh, or "
-            "choose the distance heat or edge"
+            f"{mesh.label}: exact geodesics need a manifold, but there are {'; '.join(problems)}; mend the mesh "
+            "(csm clean), or choose the distance heat or edge"
         )

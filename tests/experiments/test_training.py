@@ -25,11 +25,19 @@ from tests.learning.toys import NETWORK, QUICK
 from tests.shapes import blob
 
 
+def visible(folder):
+    return {path.name for path in folder.iterdir() if not path.name.startswith(".")}
+
+
 def test_a_training_leaves_a_checkpoint_an_export_and_its_numbers(tmp_path):
     training = a_training(tmp_path, 2, callbacks=[ValidationErrors(pairs=2, points=20)])
     trained = fit(training, tmp_path / "run")
     assert trained.checkpoint == tmp_path / "run/model.ckpt"
-    assert {p.name for p in (tmp_path / "run").iterdir() if p.name != ".csm.lock"} == {"model.ckpt", "export", "checkpoints"}
+    assert {p.name for p in (tmp_path / "run").iterdir() if p.name != ".csm.lock"} == {
+        "model.ckpt",
+        "export",
+        "checkpoints",
+    }
     assert last_checkpoint(tmp_path / "run").is_file()
     assert {"train/loss", "val/loss", "val/age", "val/exact"} <= set(trained.measured)
     assert trained.seconds > 0
@@ -70,7 +78,11 @@ def test_a_mesh_is_read_and_the_preparation_called_once(tmp_path, monkeypatch):
 
 def test_without_callbacks_and_log_nothing_else_is_written(tmp_path, capsys):
     fit(a_training(tmp_path), tmp_path / "run")
-    assert {p.name for p in (tmp_path / "run").iterdir() if p.name != ".csm.lock"} == {"model.ckpt", "export", "checkpoints"}
+    assert {p.name for p in (tmp_path / "run").iterdir() if p.name != ".csm.lock"} == {
+        "model.ckpt",
+        "export",
+        "checkpoints",
+    }
     assert "epoch" not in capsys.readouterr().out
 
 
