@@ -1,4 +1,4 @@
-# make install | demo | test | lint | clean; needs make, Python 3.10 to 3.13 with venv, and a package index.
+# make install | demo | test | soak | lint | clean; needs make, Python 3.10 to 3.13 with venv, and a package index.
 PYTHON ?= python3
 WORKERS ?= 2
 
@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test lint tables clean
+.PHONY: install demo test soak lint tables clean
 
 install: $(STAMP)
 
@@ -27,6 +27,12 @@ lint: install
 # One thread per process: the workers share the cores already.
 test: lint
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(WORKERS) --doctest-modules csm tests
+
+# What takes longer than a test should: kills at random moments, a store that is harmed, disks that get full; SOAK=4 does
+# four times as much.
+SOAK ?= 1
+soak: install
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 CSM_SOAK=$(SOAK) $(BIN)/python -m pytest -x tests/soak/soak_*.py
 
 # The tables of the README, from the json files under results/.
 tables: install

@@ -90,10 +90,7 @@ class Store:
             return found
         arrays = make()
         self.computed += 1
-        try:
-            write_entry(self.path(kind, mesh, params), kind, mesh, params, arrays)
-        except OSError as error:
-            self._warn_once(error)
+        self._keep(kind, mesh, params, arrays)
         return arrays
 
     def read(self, kind: str, mesh: Mesh, params: Mapping[str, Any]) -> Arrays | None:
@@ -117,6 +114,16 @@ class Store:
         except OSError as error:
             return _sentence(self.root, error)
         return None
+
+    def _keep(self, kind: str, mesh: Mesh, params: Mapping[str, Any], arrays: Arrays) -> None:
+        path = self.path(kind, mesh, params)
+        try:
+            try:
+                write_entry(path, kind, mesh, params, arrays)
+            except FileNotFoundError:  # the folder was removed while the file was written: it is made again
+                write_entry(path, kind, mesh, params, arrays)
+        except OSError as error:
+            self._warn_once(error)
 
     def _warn_once(self, error: OSError) -> None:
         if self.root not in _unwritable:

@@ -7,12 +7,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from csm.errors import DataError, MeshError
+from csm.mesh.io.choice import Choice
 from csm.mesh.io.files import atomic_path, read_bytes, read_bytes_of_head
 from csm.mesh.io.guard import inflate, parsing
 from csm.mesh.io.matlab import parse_mat
@@ -24,9 +25,6 @@ from csm.mesh.io.raw import RawMesh
 from csm.mesh.io.stl import parse_stl
 from csm.mesh.polygons import PolygonMesh
 from csm.mesh.shape import Mesh
-
-Choice: TypeAlias = "int | Literal['all'] | None"
-"""Which shape of a file with several: its number from 0, "all" of them joined, or None, if there has to be one only."""
 
 _ONE: Mapping[str, Callable[[bytes], RawMesh]] = MappingProxyType(
     {".off": parse_off, ".ply": parse_ply, ".obj": parse_obj, ".stl": parse_stl, ".npz": parse_npz}
@@ -52,7 +50,7 @@ def read_mesh(path: str | os.PathLike[str], name: str | None = None, choose: Cho
     name
         Name of the mesh; without it the file name without suffix.
     choose
-        Which shape of a file that holds several, see `Choice`.
+        Which shape of a file that holds several (.mat): its number, counted from 0, or "all" to join them.
 
     Raises
     ------
@@ -129,13 +127,13 @@ def count_vertices(path: str | os.PathLike[str]) -> int:
     heads: dict[str, Callable[[bytes], int]] = {".off": count_off, ".ply": lambda data: counts_ply(data)[0]}
     count = heads.get(Path(given).suffix.lower())
     if count is None:
-        return read_polygons(given, choose=None).n_vertices
+        return read_polygons(given).n_vertices
     try:
-        head = read_bytes_of_head(given)
+        return count(read_bytes_of_head(given))
     except DataError as error:
         raise MeshError(str(error)) from error.__cause__
-    with parsing(given, Path(given).suffix.lower()):
-        return count(head)
+    except (MeshError, ValueError):  # a head that is longer than usual, or damage, which the reader names
+        return read_polygons(given).n_vertices
 
 
 def write_mesh(path: str | os.PathLike[str], mesh: Mesh, colors: NDArray[Any] | None = None) -> None:

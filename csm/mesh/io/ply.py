@@ -1,51 +1,110 @@
-"""The PLY format, ASCII and binary of both byte orders; reading is trimesh's, held to the counts of the header."""
+"""The PLY format, ASCII and binary of both byte orders: http://paulbourke.net/dataformats/ply, Turk's description."""
 
 from __future__ import annotations
 
-import io
-import re
+import codecs
 
 import numpy as np
 from numpy.typing import NDArray
-from trimesh.exchange.ply import load_ply
 
+from csm._types import IntArray
 from csm.errors import MeshError
+from csm.mesh.io.ply_header import read_header
+from csm.mesh.io.ply_rows import Column, read_elements
 from csm.mesh.io.raw import RawMesh
-from csm.mesh.shape import Mesh
+from csm.mesh.shape import Mesh, whole_numbers
 
 
 def parse_ply(data: bytes) -> RawMesh:
-    """Read the vertices and triangles of a PLY file; other elements and properties are skipped.
+    """Read the vertices, faces and triangle strips of a PLY file; other elements and properties are skipped.
+
+    Faces may have any number of corners, and lists any length.  Strips become triangles, behind the faces, each turned
+    as the strip has it.
 
     Raises
     ------
     MeshError
-        If the header is damaged, counts differ from the header's (a cut file), or a face is not a triangle.
+        If the header is damaged, an element is cut short, or a row does not have the numbers that it should.
     """
-    n_vertices, n_faces = counts_ply(data)
-    # The bare loader makes no Trimesh, so nothing is merged; fix_texture would split vertices at texture seams.
-    loaded = load_ply(io.BytesIO(data), fix_texture=False, skip_materials=True)
-    vertices = np.asarray(loaded["vertices"])
-    faces = np.asarray(loaded["faces"] if n_faces else np.zeros((0, 3), np.int64))
-    if len(vertices) != n_vertices:
-        raise MeshError(f"the header announces {n_vertices} vertices, but {len(vertices)} could be read: a cut file?")
-    if faces.ndim != 2 or faces.shape != (n_faces, 3):
-        raise MeshError(
-            f"the header announces {n_faces} faces, but they are {len(faces)} triangles: either the file is cut short "
-            "or has faces of more than three corners; csm reads triangle meshes only, so triangulate it first"
-        )
-    return RawMesh.of(vertices, faces)
+    data = data.removeprefix(codecs.BOM_UTF8)
+    tables, note = read_elements(data, read_header(data), ("vertex", "face", "tristrips"))
+    notes = [note] if note else []
+    vertex = _table(tables, "vertex")
+    missing = [axis for axis in "xyz" if axis not in vertex or (vertex[axis].sizes != 1).any()]
+    if missing:
+        raise MeshError(f"the vertices have no coordinate {' and '.join(missing)}")
+    points = np.stack([vertex[axis].values.astype(np.float64) for axis in "xyz"], axis=1)
+    corners, sizes = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    if "face" in tables:
+        column = _indices(tables["face"], "face")
+        corners, sizes = whole_numbers(column.values, "faces"), column.sizes
+    if "tristrips" in tables:
+        column = _indices(tables["tristrips"], "tristrips")
+        triangles, left_out = strip_triangles(whole_numbers(column.values, "strips"), column.sizes)
+        notes.append(f"{len(triangles)} triangles were taken from {len(column.sizes)} triangle strips")
+        if left_out:
+            notes[-1] += f"; {left_out} that name a vertex twice only join strips and were left out"
+        corners = np.concatenate([corners, triangles.ravel()])
+        sizes = np.concatenate([sizes, np.full(len(triangles), 3)])
+    return RawMesh(points, corners, sizes, tuple(notes))
+
+
+def _table(tables: dict[str, dict[str, Column]], name: str) -> dict[str, Column]:
+    if name not in tables:
+        raise MeshError(f"the PLY header names no element '{name}'")
+    return tables[name]
+
+
+def _indices(columns: dict[str, Column], element: str) -> Column:
+    for name in ("vertex_indices", "vertex_index"):
+        if name in columns:
+            return columns[name]
+    if len(columns) == 1:
+        return next(iter(columns.values()))
+    raise MeshError(
+        f"the element '{element}' has no list 'vertex_indices', but {', '.join(columns)[:100] or 'nothing'}"
+    )
+
+
+def strip_triangles(corners: IntArray, sizes: IntArray) -> tuple[IntArray, int]:
+    """Return the triangles of strips, shape (M, 3), and how many were left out because they name a vertex twice.
+
+    Parameters
+    ----------
+    corners
+        The vertices of all strips, one strip after the other; -1 begins a new strip within one.
+    sizes
+        How many entries each strip has.
+    """
+    if len(corners) < 3:
+        return np.zeros((0, 3), dtype=np.int64), 0
+    begins = corners == -1
+    begins[(np.cumsum(sizes) - sizes)[sizes > 0]] = True
+    strip = np.cumsum(begins)
+    # A strip that begins with the mark of a restart has its first corner one entry later.
+    first = np.flatnonzero(begins) + (corners[begins] == -1)
+    windows = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
+    inside = (strip[:-2] == strip[2:]) & (windows != -1).all(axis=1)
+    odd = (np.arange(len(windows)) - first[strip[:-2] - 1]) % 2 == 1
+    windows[odd] = windows[odd][:, [1, 0, 2]]
+    triangles = windows[inside]
+    a, b, c = triangles.T
+    proper = (a != b) & (b != c) & (c != a)
+    return triangles[proper], int((~proper).sum())
 
 
 def counts_ply(data: bytes) -> tuple[int, int]:
-    """Return the numbers of vertices and faces that the header announces."""
-    head, end, _ = data.partition(b"end_header")
-    if not (data.startswith(b"ply") and end):
-        raise MeshError("wanted a PLY header from 'ply' to 'end_header'; this is another format or a damaged file")
-    counts = {name: int(n) for name, n in re.findall(rb"^element\s+(\w+)\s+(\d+)", head, re.MULTILINE)}
-    if b"vertex" not in counts:
+    """Return the numbers of vertices and faces that the header announces.
+
+    Raises
+    ------
+    MeshError
+        If the header is damaged or names no vertices.
+    """
+    counts = {e.name: e.count for e in read_header(data.removeprefix(codecs.BOM_UTF8)).elements}
+    if "vertex" not in counts:
         raise MeshError("the PLY header names no element 'vertex'")
-    return counts[b"vertex"], counts.get(b"face", 0)
+    return counts["vertex"], counts.get("face", 0)
 
 
 def format_ply(mesh: Mesh, colors: NDArray[np.uint8] | None = None) -> bytes:

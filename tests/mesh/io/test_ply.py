@@ -1,13 +1,17 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
 
 from csm.errors import MeshError
+from csm.mesh.io import read_mesh, read_polygons
 from csm.mesh.io.ply import counts_ply, format_ply, parse_ply
+from csm.mesh.polygons import triangulated
 from csm.mesh.shape import Mesh
-from tests.shapes import blob
-
-MESH = blob(1)
+from tests.mesh.io.plyfiles import FORMS, MESH, XYZ, made
 
 
 def header(form: str, vertex: str = "property float x\nproperty float y\nproperty float z\n", faces: int = -1) -> bytes:
@@ -80,11 +84,63 @@ def test_a_mesh_without_faces_is_read_as_such():
     np.testing.assert_array_equal(raw.vertices, MESH.vertices)
 
 
-def test_quads_are_refused_not_cut_into_triangles():
-    body = text().decode().splitlines()
-    quad = "\n".join([*body[:-1], "4 0 1 2 3"]) + "\n"
-    with pytest.raises(MeshError, match="more than three corners"):
-        parse_ply(header("ascii") + quad.encode())
+def strip_by_hand(strip: list[int]) -> list[list[int]]:
+    """The rule in words: each corner makes a triangle with the two before it, every second one turned round."""
+    found, run = [], []
+    for corner in strip:
+        run = [] if corner == -1 else [*run, corner]
+        if len(run) >= 3:
+            a, b, c = run[-3:]
+            if len({a, b, c}) == 3:
+                found.append([a, b, c] if len(run) % 2 else [b, a, c])
+    return found
+
+
+@given(st.lists(st.lists(st.integers(-1, 5), max_size=9), min_size=1, max_size=4), st.sampled_from(FORMS))
+def test_strips_become_triangles_of_one_orientation(strips, form):
+    raw = parse_ply(made(form, {"vertex": XYZ, "tristrips": [("list int int vertex_indices", strips)]}))
+    assert raw.faces.tolist() == [triangle for strip in strips for triangle in strip_by_hand(strip)]
+
+
+def test_faces_and_strips_add_up_and_that_is_noted():
+    lists = "list int int vertex_indices"
+    raw = parse_ply(
+        made("ascii", {"vertex": XYZ, "face": [(lists, [[5, 6, 7]])], "tristrips": [(lists, [[0, 1, 2, 3]])]})
+    )
+    assert raw.faces.tolist() == [[5, 6, 7], [0, 1, 2], [2, 1, 3]]
+    assert raw.notes == ("2 triangles were taken from 1 triangle strips",)
+
+
+CASES = Path(__file__).parents[2] / "cases"
+
+
+@pytest.mark.parametrize("name", ["ascii_blank_lines", "trailing_bytes_bin", "vertex_with_varying_list_property"])
+def test_sound_cases_are_read(name):
+    reference, mesh = read_mesh(CASES / "plain.off.gz"), read_mesh(CASES / f"{name}.ply")
+    np.testing.assert_allclose(mesh.vertices, reference.vertices, atol=1e-6)
+    np.testing.assert_array_equal(mesh.faces, reference.faces)
+
+
+def test_the_cube_of_quads_and_the_mixed_one_have_its_area():
+    for name, sizes in (("quads", [4] * 6), ("mixed_tri_quad_bin", None)):
+        cube = read_polygons(CASES / f"{name}.ply")
+        assert sizes is None or cube.sizes.tolist() == sizes
+        extent = np.ptp(cube.vertices, axis=0)
+        made = triangulated(cube)
+        assert made.mesh.area == pytest.approx(2 * (extent * np.roll(extent, 1)).sum())
+        assert len(made.face_map) == made.mesh.n_faces
+
+
+def test_the_strips_of_the_case():
+    assert read_mesh(CASES / "tristrips.ply").faces.tolist() == [[0, 1, 3], [3, 1, 2], [3, 2, 6], [4, 5, 7]]
+
+
+@pytest.mark.parametrize(
+    ("name", "message"), [("odd_values", "line 'elemenloat q'"), ("ragged", "vertex 161 is '3 0 42 44'")]
+)
+def test_damaged_cases_give_one_sentence(name, message):
+    with pytest.raises(MeshError, match=rf"{name}\.ply: .*{message}"):
+        read_mesh(CASES / "damaged" / f"{name}.ply")
 
 
 def test_what_is_no_ply_is_refused():
