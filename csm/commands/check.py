@@ -1,4 +1,4 @@
-"""`csm check FOLDER`: what is wrong with the meshes of a folder, which set it is, and what is missing."""
+"""`csm check FOLDER`, `csm check a.off b.ply`: what is wrong with meshes, which set it is, and what is missing."""
 
 from __future__ import annotations
 
@@ -11,10 +11,13 @@ from typing import Any
 from omegaconf import DictConfig
 
 from csm.commands.app import command
-from csm.data.folders import FolderSet, Missing
+from csm.data.folders import FolderSet, Missing, SameFaces
 from csm.data.inspection import Inspected, inspect
 from csm.data.registry import recognise
-from csm.errors import ConfigError, DataError
+from csm.errors import ConfigError, CsmError, DataError
+from csm.matching.subjects import subject_of
+from csm.mesh.check import Finding, require_usable
+from csm.mesh.io import READABLE, list_files
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,14 +45,75 @@ class Report:
 
 
 def run(cfg: DictConfig) -> dict[str, Any]:
-    """Check the folder of the configuration and print the table; DataError if a shape cannot be used."""
-    if cfg.folder is None:
-        raise ConfigError("check needs a folder of meshes: csm check FOLDER")
-    report = check_folder(Path(cfg.folder))
+    """Check files or a folder and print the table; DataError if something cannot be used for what is asked."""
+    paths = [Path(path) for path in [*cfg.paths, *([cfg.folder] if cfg.folder else [])]]
+    if not paths:
+        raise ConfigError("check needs meshes: csm check FOLDER, or csm check a.off b.ply")
+    if cfg.use not in (None, "train", "match"):
+        raise ConfigError(f"use={cfg.use}: wanted train, match or null")
+    if len(paths) == 1 and paths[0].is_dir() and cfg.use != "match":
+        try:
+            report = check_folder(paths[0])
+        except DataError as error:
+            if cfg.use == "train" or not list_files(paths[0], *READABLE):
+                raise
+            print(f"No data set ({error}), so each mesh is checked as one to match.\n")
+            return check_files(paths)
+        if cfg.use == "train" or _is_of_one_template(report.shapes):
+            return _conclude(report, paths[0])
+        print("The meshes differ in their triangles and there are no maps, so each is checked as one to match.\n")
+    return check_files(paths)
+
+
+def _conclude(report: Report, folder: Path) -> dict[str, Any]:
     print(report)
     if report.n_unusable:
-        raise DataError(f"{cfg.folder}: {report.n_unusable} of {len(report.rows)} shapes cannot be used, see the table")
+        raise DataError(f"{folder}: {report.n_unusable} of {len(report.rows)} shapes cannot be used, see the table")
     return {"shapes": len(report.rows), "missing": len(report.shapes.missing)}
+
+
+def _is_of_one_template(shapes: FolderSet) -> bool:
+    """Tell whether a folder is meant as a set with correspondence: it has maps, or meshes of one connectivity."""
+    if not any(isinstance(entry.truth, SameFaces) for entry in shapes.entries):
+        return True
+    known = sum(_has_truth(shapes, name) for name in shapes.names)
+    return known > 1 or len(shapes.names) == 1
+
+
+def _has_truth(shapes: FolderSet, name: str) -> bool:
+    try:
+        shapes.load(name)
+    except CsmError:
+        return False
+    return True
+
+
+def check_files(paths: Sequence[Path]) -> dict[str, Any]:
+    """Check meshes one by one, as `csm match` would take them; DataError if one cannot be used even after cleaning."""
+    files = [file for path in paths for file in (list_files(path, *READABLE) if path.is_dir() else [path])]
+    if not files:
+        raise DataError(f"{paths[0]}: there are no meshes in this folder; csm reads {', '.join(READABLE)}")
+    rows = [_of_file(file) for file in files]
+    print("\n".join(_table(rows)))
+    bad = [row for row in rows if row.problems]
+    print(f"\n{len(rows)} meshes, {len(rows) - len(bad)} can be matched")
+    if bad:
+        raise DataError(f"{len(bad)} of {len(rows)} meshes cannot be used, see the table")
+    return {"shapes": len(rows), "missing": 0}
+
+
+def _of_file(file: Path) -> Inspected:
+    try:
+        subject = subject_of(file)
+        require_usable(subject.cleaned.mesh)
+    except CsmError as error:
+        return Inspected(file.name, problems=(str(error),))
+    mesh, mends = subject.given, subject.cleaned.text
+    notes = [Finding("note", 1, (), "note", note) for note in mesh.notes]
+    notes += (
+        [Finding("cleaned", len(subject.cleaned.mends), (), "note", f"csm match cleans it: {mends}")] if mends else []
+    )
+    return Inspected(file.name, mesh.n_vertices, mesh.n_faces, mesh.area, (*notes, *subject.findings))
 
 
 def check_folder(folder: Path, progress: bool = True) -> Report:

@@ -7,7 +7,7 @@ import textwrap
 from dataclasses import dataclass, field
 
 from csm.commands.groups import config_folder, options_of
-from csm.commands.words import WORDS
+from csm.commands.words import LISTS, WORDS
 
 _OPTION = re.compile(r"(?P<key>\w+):\s*(?P<value>[^#]*?)\s*(?:#\s*(?P<words>.*))?")
 _ITEM = re.compile(
@@ -73,7 +73,7 @@ def help_text(command: str, config_name: str, more: str = "") -> str:
     """
     page = read_page(config_name)
     own = sorted(page.options, key=lambda option: option[0] in {key for key, *_ in read_page("common").options})
-    words = " ".join(f"[{key.upper()} ...]" if key == "targets" else key.upper() for key in WORDS.get(command, ()))
+    words = " ".join(f"[{key.upper()} ...]" if key in LISTS else key.upper() for key in WORDS.get(command, ()))
     lines = [f"usage: csm {command} {words} [key=value ...]".replace("  ", " "), ""]
     lines += [*textwrap.wrap(" ".join(page.purpose), _WIDTH), ""]
     lines += [more, ""] if more else []
@@ -84,7 +84,7 @@ def help_text(command: str, config_name: str, more: str = "") -> str:
     groups = [row for row in page.groups if len(options_of(row[0])) > 1]
     if groups:
         lines += ["", "groups, of which one option each is chosen as GROUP=OPTION:"]
-        lines += _table([(group, _choices(group, choice, text)) for group, choice, text in page.groups])
+        lines += _table([(group, _choices(group, choice, text)) for group, choice, text in groups])
         lines += ["", "An option has settings of its own, such as descriptor.k=20; --cfg job shows all of them."]
     lines += [
         "",

@@ -18,7 +18,7 @@ _OVERWRITE = "give another out=, or overwrite=true to replace it"
 
 
 def require_place(path: Path, what: str = "out") -> None:
-    """Raise before the work if a file or folder cannot be written at `path`; nothing is made.
+    """Raise before the work if a folder cannot be made, or written into, at `path`; nothing is made.
 
     Raises
     ------
@@ -27,13 +27,12 @@ def require_place(path: Path, what: str = "out") -> None:
     """
     try:
         path.lstat()
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         pass
     except OSError as error:
-        raise ConfigError(
-            f"{what}={path}: {(error.strerror or 'cannot be used').lower()}; choose another place"
-        ) from None
-    above = next(p for p in [path, *path.absolute().parents] if os.path.lexists(p) and (p != path or p.is_dir()))
+        why = (error.strerror or "cannot be used").lower()
+        raise ConfigError(f"{what}={path}: {why}; choose another place") from None
+    above = next(place for place in (path, *path.absolute().parents) if os.path.lexists(place))
     if not above.is_dir():
         raise ConfigError(f"{what}={path}: {above} is a file, wanted a folder; choose another place")
     if not os.access(above, os.W_OK | os.X_OK):
@@ -44,7 +43,10 @@ def require_file_place(path: Path, what: str = "out") -> None:
     """Raise before the work if a file cannot be written at `path`, see `require_place`."""
     if path.is_dir():
         raise ConfigError(f"{what}={path}: this is a folder, wanted the name of a file")
-    require_place(path.parent if os.path.lexists(path) else path, what)
+    if os.path.lexists(path):
+        require_place(path.parent, what)
+    else:
+        require_place(path, what)
 
 
 def require_not_input(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:

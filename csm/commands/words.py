@@ -18,19 +18,20 @@ WORDS: dict[str, tuple[str, ...]] = {
     "match": ("source", "target", "out"),
     "describe": ("mesh", "out"),
     "clean": ("in", "out"),
-    "check": ("folder",),
+    "check": ("paths",),
     "evaluate": ("checkpoint",),
     "reproduce": ("targets",),
     "bench": ("targets",),
 }
 """Commands that take words without a key, with the keys that the words are for, in order."""
 
-LISTS = ("targets",)
+LISTS = ("targets", "paths")
 """Keys that take all words."""
 
 PATHS = frozenset(
     (
         *("source", "target", "out", "mesh", "in", "checkpoint", "folder", "resume", "results", "store"),
+        "paths",
         *("data.root", "data.split", "data.test_roots"),
     )
 )
@@ -102,7 +103,8 @@ def _named(command: str, words: Sequence[str]) -> list[str]:
     if not words:
         return []
     if keys and keys[0] in LISTS:
-        return [f"{keys[0]}=[{','.join(words)}]"]
+        each = words if keys[0] not in PATHS else [quoted(os.path.expanduser(word)) for word in words]
+        return [f"{keys[0]}=[{','.join(each)}]"]
     if len(words) > len(keys):
         extra = words[len(keys)]
         takes = f"takes {' '.join(key.upper() for key in keys)} and " if keys else "takes "

@@ -199,7 +199,7 @@ def _make_trainer(training: Training, folder: Path) -> L.Trainer:
     trainer = training.trainer(
         callbacks=[*training.callbacks, RandomStates(), FiniteLoss(), keep],
         plugins=[WholeCheckpoints()],
-        logger=training.logger(save_dir=folder) if training.logger else False,
+        logger=_make_logger(training, folder),
         default_root_dir=folder,
         **({} if sys.stdout.isatty() else {"enable_progress_bar": False}),
     )
@@ -209,6 +209,17 @@ def _make_trainer(training: Training, folder: Path) -> L.Trainer:
             "trainer.devices=1"
         )
     return trainer
+
+
+def _make_logger(training: Training, folder: Path) -> Logger | bool:
+    if training.logger is None:
+        return False
+    try:
+        logger = training.logger(save_dir=folder)
+        _ = logger.experiment if hasattr(logger, "experiment") else None  # what it refuses, it refuses here
+    except TypeError as error:
+        raise ConfigError(f"logger: {error}") from error
+    return logger
 
 
 def _quiet_lightning() -> None:

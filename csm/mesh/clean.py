@@ -121,9 +121,10 @@ def clean(
         if not 0 <= value < 1:
             raise ConfigError(f"{name}={value}; wanted a fraction from 0 to below 1")
     work = _Work.of(mesh)
+    unsound = work.drop_unsound_faces()  # a face that is there twice has no boundary to be welded
     if weld:
         work.weld(tolerance)
-    work.drop_unsound_faces()
+    work.note_unsound_faces(unsound + work.drop_unsound_faces())
     work.collapse()
     if split:
         work.split()
@@ -191,8 +192,10 @@ class _Work:
         self.faces, self.face_map = self.faces[kept], self.face_map[kept]
         return int((~kept).sum())
 
-    def drop_unsound_faces(self) -> None:
-        count = self._keep_faces(sound_faces(self.faces))
+    def drop_unsound_faces(self) -> int:
+        return self._keep_faces(sound_faces(self.faces))
+
+    def note_unsound_faces(self, count: int) -> None:
         self._did("faces", count, "faces left out: corners that coincide, or a face twice")
 
     def collapse(self) -> None:

@@ -1,7 +1,11 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
+from omegaconf import OmegaConf
 
-from csm.commands.check import check_folder
+from csm.commands.check import check_folder, run
+from csm.errors import DataError
 from csm.mesh.io import write_mesh
 from csm.mesh.shape import Mesh
 from tests.data import layouts
@@ -29,11 +33,50 @@ def test_errors_and_notes_stand_in_the_row(tmp_path):
     (tmp_path / "b.off").write_text("nonsense")
     report = check_folder(tmp_path, progress=False)
     a, b = str(report).splitlines()[1:3]
-    assert "ERROR vertices in no face: 1 (42)" in a
+    assert "; vertices in no face: 1 (42)" in a or a.split()[4] == "vertices"
     assert "boundary edges: 3" in a
     assert "ERROR" in b
     assert "b.off" in b
-    assert report.n_unusable == 2
+    assert report.n_unusable == 1
+
+
+CASES = Path(__file__).parent.parent / "cases"
+
+
+def checked(capsys, *paths, use=None, folder=None):
+    """Run the command; return what it printed, and the message of its error."""
+    error = ""
+    try:
+        run(OmegaConf.create({"paths": [str(path) for path in paths], "folder": folder, "use": use}))
+    except DataError as raised:
+        error = str(raised)
+    return capsys.readouterr().out, error
+
+
+def test_files_are_checked_as_meshes_to_match(capsys):
+    out, error = checked(capsys, CASES / "spot_half.off", CASES / "spot_inside_out.off")
+    assert error == ""
+    assert "boundary edges: 54" in out
+    assert "csm match cleans it: 1654 faces turned" in out
+    assert "2 meshes, 2 can be matched" in out
+    out, error = checked(capsys, CASES / "spot_half.off", CASES / "gone.off")
+    assert "ERROR" in out
+    assert "1 of 2 meshes cannot be used" in error
+
+
+def test_a_folder_of_unlike_meshes_needs_no_correspondence_to_be_matched(tmp_path, capsys):
+    for n in (1, 2, 3):
+        write_mesh(tmp_path / f"{n}.off", sphere(n))
+    out, error = checked(capsys, tmp_path)
+    assert error == ""
+    assert "checked as one to match" in out
+    assert "3 of 3" not in out
+    assert "the correspondence of this shape is not known" in checked(capsys, tmp_path, use="train")[0]
+    assert "3 meshes, 3 can be matched" in checked(capsys, folder=str(tmp_path), use="match")[0]
+    write_mesh(tmp_path / "1.ply", sphere(1))
+    out, error = checked(capsys, tmp_path)
+    assert "have one name" in out
+    assert "4 meshes, 4 can be matched" in out
 
 
 @pytest.mark.data

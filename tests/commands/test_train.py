@@ -14,7 +14,7 @@ TOYS = [*SMALL, "data.root=toys"]
     [
         ([*TOYS, "matching=[nope]"], "matching='nope'"),
         ([*TOYS, "device=meta"], "device=meta"),
-        ([*TOYS, "metric.distance=nope"], "distance='nope'"),
+        ([*TOYS, "metric.distance=nope"], "metric.distance=nope"),
         (["recipe=acscnn", "experiment=humans"], "experiment=humans chooses csmcnn"),
     ],
 )

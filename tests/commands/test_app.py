@@ -1,0 +1,199 @@
+"""How a command ends: its status, what it says, and what it leaves in the current folder."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from hydra.core.global_hydra import GlobalHydra
+
+from csm.commands import app
+from csm.commands.main import main
+from csm.mesh.io import read_mesh, write_mesh
+from tests.commands.test_pipeline import SMALL
+from tests.shapes import blob
+from tests.toyset import write_toys
+
+TRAIN = [*SMALL, "data.root=toys", "trainer.max_epochs=12", "test=false", "logger=none", "callbacks=none"]
+
+
+@pytest.fixture
+def csm(monkeypatch, tmp_path, capfd):
+    """Return a function that runs ``csm WORDS`` in an empty folder and gives status, output and error output."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("CSM_CACHE", str(tmp_path / ".store"))
+
+    def call(*words: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["csm", *words])
+        GlobalHydra.instance().clear()
+        status = 0
+        try:
+            main()
+        except SystemExit as ended:
+            status = int(ended.code or 0)
+        return (status, *capfd.readouterr())
+
+    return call
+
+
+def visible(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir() if not path.name.startswith(".")}
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["match"], "match needs two meshes: csm match SOURCE TARGET"),
+        (["match", "nan.off", "gone.off"], "nan.off"),
+        (["describe", "gone.off", "d.npz"], "gone.off: there is no such file"),
+        (["check", "gone"], "cannot be used"),
+        (["train", "seed=-1"], "seed=-1: wanted a whole number from 0"),
+        (["train", "descriptor=adc"], "did you mean"),
+        (["train", "matching=[nope]"], "matching='nope'"),
+        (["train", "resume=gone.ckpt"], "gone.ckpt: there is no such checkpoint"),
+        (["train", "trainer.precision=3"], "precision"),
+        (["evaluate", "gone.ckpt"], "gone.ckpt: there is no such checkpoint"),
+        (["matrix"], "matrix needs rows"),
+        (["trian"], "did you mean train?"),
+    ],
+)
+def test_a_failing_call_is_one_paragraph_with_status_2_and_leaves_nothing(csm, tmp_path, words, said):
+    write_mesh(tmp_path / "nan.off", blob(1))
+    (tmp_path / "nan.off").write_text((tmp_path / "nan.off").read_text().replace("\n3 ", "\n3 nan ", 1))
+    status, _, error = csm(*words)
+    assert status == 2
+    assert said in error
+    assert error.count("csm: ") == 1
+    assert "Traceback" not in error
+    assert "Error executing job" not in error
+    assert visible(tmp_path) == {"nan.off"}
+
+
+def test_a_defect_keeps_its_traceback_and_has_status_1(csm, monkeypatch):
+    def broken(*args, **options):
+        raise ZeroDivisionError("a defect")
+
+    monkeypatch.setattr("csm.commands.check.check_files", broken)
+    status, _, error = csm("check", "a.off")
+    assert status == 1
+    assert "Traceback" in error
+    assert "please report it" in error
+
+
+def test_debug_shows_the_traceback_of_what_can_be_mended(csm):
+    status, _, error = csm("describe", "gone.off", "d.npz", "debug=true")
+    assert status == 2
+    assert "Traceback" in error
+
+
+def test_match_takes_any_names_and_leaves_one_folder(csm, tmp_path):
+    names = ["my body (1)=x.off", "it's #2, é.off"]
+    for name in names:
+        write_mesh(tmp_path / name, blob(2))
+    status, out, _ = csm("match", *names, "descriptor=wks", "descriptor.k=30", "out=2024")
+    assert status == 0
+    assert "100 % of the matched vertices return" in out
+    assert visible(tmp_path) == {*names, "2024"}
+    assert (np.loadtxt(tmp_path / "2024/map.txt") == np.arange(162)).mean() > 0.9
+    account = json.loads((tmp_path / "2024/match.json").read_text())
+    assert account["source"]["file"] == names[0]
+    assert account["notes"] == []
+    status, _, _ = csm("match", *names, "descriptor=wks", "descriptor.k=30", "out=2024")
+    assert status == 0, "what csm wrote may be written again"
+    (tmp_path / "2024/map.txt").write_text("mine")
+    status, _, error = csm("match", *names, "descriptor=wks", "descriptor.k=30", "out=2024")
+    assert status == 2
+    assert "overwrite=true" in error
+    assert (tmp_path / "2024/map.txt").read_text() == "mine"
+
+
+def test_no_command_writes_over_its_input(csm, tmp_path):
+    mesh = blob(2)
+    np.savez(tmp_path / "a.npz", vertices=mesh.vertices, faces=mesh.faces)
+    for name in ("source.ply", "target.ply"):
+        write_mesh(tmp_path / name, mesh)
+    before = {name: (tmp_path / name).read_bytes() for name in ("a.npz", "source.ply", "target.ply")}
+    for words in (
+        ["describe", "mesh=a.npz", "out=a.npz"],
+        ["describe", "mesh=a.npz", "out=a.npz", "overwrite=true"],
+        ["match", "source=source.ply", "target=target.ply", "out=."],
+        ["match", "source=source.ply", "target=target.ply", "out=.", "overwrite=true"],
+        ["clean", "source.ply", "source.ply", "overwrite=true"],
+        ["clean", "source.ply", "target.ply"],
+    ):
+        assert csm(*words)[0] == 2
+    assert {name: (tmp_path / name).read_bytes() for name in before} == before
+    assert visible(tmp_path) == set(before)
+
+
+def test_clean_writes_the_mesh_its_maps_and_an_account(csm, tmp_path):
+    loose = blob(2)
+    corners = loose.corners.reshape(-1, 3)
+    (tmp_path / "soup.obj").write_text(
+        "".join(f"v {x!r} {y!r} {z!r}\n" for x, y, z in corners.tolist())
+        + "".join(f"f {i + 1} {i + 2} {i + 3}\n" for i in range(0, len(corners), 3))
+    )
+    status, out, _ = csm("clean", "soup.obj", "clean.ply")
+    assert status == 0
+    assert "welded" in out
+    assert visible(tmp_path) == {
+        *("soup.obj", "clean.ply", "clean.old_to_new.txt", "clean.new_to_old.txt", "clean.clean.json")
+    }
+    there = np.loadtxt(tmp_path / "clean.old_to_new.txt", dtype=int)
+    np.testing.assert_array_equal(read_mesh(tmp_path / "clean.ply").vertices[there], corners)
+    assert csm("clean", "soup.obj", "clean.ply")[0] == 0
+
+
+def test_describe_gives_rows_for_the_vertices_of_the_file(csm, tmp_path):
+    shutil.copy(Path(__file__).parent.parent / "cases/spot_isolated_vertex.off", tmp_path / "a.off")
+    status, out, _ = csm("describe", "a.off", "d.npz", "descriptor=gps", "descriptor.k=20")
+    assert status == 0
+    assert "1 vertices in no face" in out
+    values = np.load(tmp_path / "d.npz")["values"]
+    assert np.isnan(values).all(axis=1).sum() == 1
+    assert len(values) == 830
+
+
+def test_two_runs_of_one_second_get_two_folders(tmp_path, monkeypatch):
+    monkeypatch.setattr(app.time, "strftime", lambda form: "2026-01-01_00-00-00")
+    made = [app.new_folder(tmp_path / "train") for _ in range(3)]
+    assert [folder.name.removeprefix("2026-01-01_00-00-00") for folder in made] == ["", "_2", "_3"]
+    assert all(folder.is_dir() for folder in made)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)], ids=["TERM", "INT"])
+def test_a_stopped_training_says_what_is_kept_and_goes_on_in_its_folder(tmp_path, number, status):
+    write_toys(tmp_path / "toys")
+    words = [sys.executable, "-m", "csm.commands.main", "train", *TRAIN]
+    environment = {**os.environ, "CSM_CACHE": str(tmp_path / "store")}
+
+    def start(folder: str, *more: str) -> subprocess.Popen[str]:
+        line = [*words, f"hydra.run.dir={folder}", *more]
+        return subprocess.Popen(
+            line, cwd=tmp_path, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        )
+
+    assert start("whole").wait() == 0
+    run = start("cut", "callbacks=default", "~callbacks.errors", "~callbacks.panels")
+    assert run.stdout is not None
+    while not run.stdout.readline().startswith("epoch 3 "):
+        time.sleep(0.01)
+    run.send_signal(number)
+    _, error = run.communicate(timeout=60)
+    assert run.returncode == status
+    assert "csm: stopped: " in error
+    assert "of 12 epochs are done" in error
+    assert "Traceback" not in error
+    assert start("cut").wait() == 0
+    whole, cut = (torch.load(tmp_path / f / "model.ckpt", weights_only=True)["state_dict"] for f in ("whole", "cut"))
+    assert all(torch.equal(whole[name], cut[name]) for name in whole)

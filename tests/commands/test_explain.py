@@ -1,0 +1,85 @@
+from __future__ import annotations
+
+import errno
+import os
+
+import pytest
+from hydra import compose, initialize_config_dir
+from hydra.core.global_hydra import GlobalHydra
+
+from csm.commands.explain import explained, known_keys
+from csm.commands.groups import config_folder, register
+from csm.errors import ConfigError, MeshError
+
+register("data", "descriptor", "model")
+
+
+@pytest.mark.parametrize(
+    ("override", "said"),
+    [
+        ("optimizer.lrr=1", "there is no option 'optimizer.lrr'; did you mean optimizer.lr"),
+        ("optimizr.lr=1", "there is no option 'optimizr.lr'; did you mean optimizer.lr"),
+        ("optimizer.loss_rows=3", "optimizer.loss_rows is now learning.loss_rows"),
+        ("descriptor=adc", "descriptor=adc: there is no such option; did you mean"),
+        ("experiment=human", "did you mean humans"),
+        ("descriptor=null", "a group takes the name of one of its options"),
+        ("hydra/launcher=joblib", "pip install 'csm[sweep]'"),
+        ("hydra/sweeper=optuna", "pip install 'csm[sweep]'"),
+        ("~foo", "~foo: there is no such key to leave out"),
+        ("seed==1", "'seed==1' is not of the form key=value"),
+        ("seed=[1", "not of the form key=value"),
+    ],
+)
+def test_what_hydra_refuses_is_one_paragraph(override, said):
+    GlobalHydra.instance().clear()
+    with initialize_config_dir(str(config_folder()), version_base="1.3"), pytest.raises(Exception) as refused:  # noqa: PT011
+        compose("train", [override])
+    text = explained(refused.value, "train")
+    assert text is not None
+    assert said in text
+    assert "\n" not in text
+
+
+def test_errors_of_csm_are_found_in_the_chain():
+    outer = RuntimeError("outer")
+    outer.__cause__ = MeshError("a.off: the file is empty")
+    assert explained(outer, "match") == "a.off: the file is empty"
+
+
+@pytest.mark.parametrize(
+    ("number", "said"),
+    [
+        (errno.ENOSPC, "out/x.ply: the disk is full"),
+        (errno.EACCES, "permission denied"),
+        (errno.EROFS, "read-only"),
+        (errno.ENAMETOOLONG, "too long"),
+        (errno.ENOTDIR, "a file stands where a folder is wanted"),
+        (errno.EIO, os.strerror(errno.EIO)),
+    ],
+)
+def test_the_operating_system_is_put_into_words(number, said):
+    text = explained(OSError(number, os.strerror(number), "out/x.ply"), "match")
+    assert text is not None
+    assert said in text
+    assert "out/x.ply" in text
+
+
+def test_missing_extras_and_memory_are_named():
+    assert "csm[viz]" in str(explained(ModuleNotFoundError("No module", name="polyscope"), "match"))
+    assert "not enough memory" in str(explained(MemoryError("8 GiB"), "match"))
+    assert "no graphics card" in str(explained(RuntimeError("Found no NVIDIA driver on your system"), "match"))
+
+
+@pytest.mark.parametrize("error", [KeyError("x"), ValueError("odd"), ZeroDivisionError(), ModuleNotFoundError("x")])
+def test_a_defect_is_not_explained_away(error):
+    assert explained(error, "match") is None
+
+
+def test_keys_of_a_command_are_listed_with_dots():
+    keys = known_keys("match")
+    assert {"source", "descriptor.alpha", "overwrite"} <= set(keys)
+    assert known_keys("no_such_command") == []
+
+
+def test_a_config_error_is_itself():
+    assert explained(ConfigError("seed=-1"), "train") == "seed=-1"

@@ -1,0 +1,90 @@
+from __future__ import annotations
+
+import pytest
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hypothesis import given
+from hypothesis import strategies as st
+
+from csm.commands.words import nearest_names, quoted, to_overrides
+from csm.errors import ConfigError
+
+NAMES = ["a b (1).off", "it's.ply", "x=y.obj", "[1].off", "é~#,{}.off", "2024", "null", 'a"b.off', "a\\b", "true"]
+
+
+def parsed(override: str) -> object:
+    return OverridesParser.create().parse_override(override).value()
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("form", ["{}", "source={}"])
+def test_any_path_reaches_the_configuration_as_it_was_typed(tmp_path, monkeypatch, name, form):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / name).touch()
+    (override,) = to_overrides("match", [form.format(name)])
+    assert override.startswith("source=")
+    wanted = None if (name, form) == ("null", "source={}") else name
+    assert parsed(override) == wanted
+
+
+@given(st.text(st.characters(blacklist_categories=("Cs", "Cc")), min_size=1))
+def test_quotes_hold_any_text(text):
+    assert parsed(f"out={quoted(text)}") == text
+
+
+def test_words_get_their_keys_in_order_and_options_may_stand_anywhere():
+    assert to_overrides("match", ["a.off", "device=cpu", "b.off", "o"]) == [
+        *("source='a.off'", "target='b.off'", "out='o'", "device=cpu")
+    ]
+    assert to_overrides("check", ["--cfg", "job", "meshes"]) == ["paths=['meshes']", "--cfg", "job"]
+    assert to_overrides("reproduce", ["table1", "seed=1", "figure4"]) == ["targets=[table1,figure4]", "seed=1"]
+
+
+def test_the_home_folder_is_found(monkeypatch):
+    monkeypatch.setenv("HOME", "/home/someone")
+    assert to_overrides("match", ["~/a.off", "out=~/o"]) == ["source='/home/someone/a.off'", "out='/home/someone/o'"]
+
+
+def test_the_sweep_flag_comes_first_wherever_it_stands():
+    typed = ["experiment=humans", "-m", "seed=0,1", "--multirun"]
+    assert to_overrides("train", typed) == ["-m", "experiment=humans", "seed=0,1"]
+
+
+def test_in_a_sweep_a_list_of_paths_stays_a_list_unless_a_file_has_that_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert to_overrides("evaluate", ["-m", "checkpoint=a b.ckpt,c.ckpt"]) == ["-m", "checkpoint='a b.ckpt','c.ckpt'"]
+    (tmp_path / "a,b.ckpt").touch()
+    assert to_overrides("evaluate", ["-m", "checkpoint=a,b.ckpt"]) == ["-m", "checkpoint='a,b.ckpt'"]
+
+
+def test_lists_of_paths_are_quoted_one_by_one():
+    assert parsed(to_overrides("train", ["data.test_roots=[p q/meshes,r=s]"])[0]) == ["p q/meshes", "r=s"]
+
+
+def test_what_is_no_path_is_left_to_hydra():
+    typed = ["~logger", "+data.x=1", "matching=[nearest,argmax]", "store=${oc.env:X}", "results=null", "out='x y'"]
+    assert to_overrides("train", typed) == typed
+
+
+def test_groups_can_be_left_out_with_null():
+    assert to_overrides("train", ["logger=null", "experiment=null", "recipe=", "resume=null"]) == [
+        *("logger=none", "resume=null")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("command", "typed", "said"),
+    [
+        ("train", ["humans"], "got 'humans'; did you mean experiment=humans?"),
+        ("train", ["wks"], "did you mean descriptor=wks?"),
+        ("match", ["a", "b", "c", "d"], "takes SOURCE TARGET OUT and options of the form key=value, got 'd'"),
+    ],
+)
+def test_a_word_too_many_is_named(command, typed, said):
+    with pytest.raises(ConfigError) as refused:
+        to_overrides(command, typed)
+    assert said in str(refused.value)
+
+
+def test_only_near_names_are_offered():
+    assert nearest_names("adc", ["acd", "hks"]) == "; did you mean acd?"
+    assert nearest_names("zzz", ["acd", "hks"]) == ""
