@@ -74,8 +74,12 @@ def read_split(path: str | Path) -> Split:
     """
     try:
         content = json.loads(Path(path).read_text())
-        split = Split(content["name"], tuple(content["train"]), tuple(content["test"]), content.get("source", ""))
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        lists = content["train"], content["test"]
+        if not all(isinstance(names, list) and all(isinstance(name, str) for name in names) for names in lists):
+            raise TypeError("train and test are not lists of names")
+        train, test = map(tuple, lists)
+        split = Split(str(content["name"]), train, test, str(content.get("source", "")))
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise DataError(f"{path}: not a split file; wanted json with name, train and test ({error!r})") from error
     both = [*split.train, *split.test]
     if len(set(both)) != len(both):

@@ -46,6 +46,10 @@ def test_a_split_is_read_from_json(tmp_path):
     ("content", "message"),
     [
         ("{", "not a split file"),
+        ("[" * 100_000, "not a split file"),
+        ("[1]", "not a split file"),
+        ('{"name": "a", "train": "xyz", "test": ["w"]}', "not lists of names"),
+        ('{"name": "a", "train": [1, 2], "test": ["w"]}', "not lists of names"),
         ('{"name": "a", "train": ["x"]}', "not a split file"),
         ('{"name": "a", "train": ["x"], "test": ["x"]}', "more than once: x"),
         ('{"name": "a", "train": ["x"], "test": ["y"], "checksum": "0"}', "it was edited"),
