@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import signal
 import sys
+import tempfile
 import threading
 import time
 import warnings
@@ -121,8 +122,8 @@ def fit(training: Training, folder: Path, resume: Path | str | None = AUTO) -> T
 
 def _fit(training: Training, folder: Path, resume: Path | str | None) -> Trained:
     L.seed_everything(training.seed, workers=True, verbose=False)
-    trainer = _make_trainer(training, folder)
     begin = resume_point(folder, resume)
+    trainer = _make_trainer(training, folder)
     with torch.device("meta"):  # what does not fit fails before the preparation
         sketch = make_module(training, 1, trainer.max_epochs)
     if begin:
@@ -215,11 +216,11 @@ def _make_logger(training: Training, folder: Path) -> Logger | bool:
     if training.logger is None:
         return False
     try:
-        logger = training.logger(save_dir=folder)
-        _ = logger.experiment if hasattr(logger, "experiment") else None  # what it refuses, it refuses here
+        with tempfile.TemporaryDirectory(prefix="csm-") as elsewhere:  # what it refuses, it refuses when it writes
+            _ = getattr(training.logger(save_dir=elsewhere), "experiment", None)
     except TypeError as error:
         raise ConfigError(f"logger: {error}") from error
-    return logger
+    return training.logger(save_dir=folder)
 
 
 def _quiet_lightning() -> None:
