@@ -65,10 +65,8 @@ def parsing(path: str, wanted: str) -> Iterator[None]:
     """Name the file in the errors of a parser, and make one of whatever a damaged file lets a library raise."""
     try:
         yield
-    except MeshError as error:
+    except CsmError as error:
         raise MeshError(f"{path}: {error}") from error.__cause__
-    except CsmError:
-        raise
     except MemoryError:
         raise MeshError(f"{path}: this needs more memory than there is; the file may be damaged") from None
     except Exception as error:
