@@ -66,7 +66,8 @@ def parsing(path: str, wanted: str) -> Iterator[None]:
     try:
         yield
     except CsmError as error:
-        raise MeshError(f"{path}: {error}") from error.__cause__
+        message = str(error)
+        raise MeshError(message if message.startswith(f"{path}: ") else f"{path}: {message}") from error.__cause__
     except MemoryError:
         raise MeshError(f"{path}: this needs more memory than there is; the file may be damaged") from None
     except Exception as error:

@@ -69,7 +69,9 @@ def read_mesh(path: str | os.PathLike[str], name: str | None = None, choose: Cho
         If the file is missing, damaged, of another format, not a triangle mesh, or a face refers to a vertex that
         does not exist (a 1-based file is named as such).
     """
-    return read_polygons(path, name, choose).triangles()
+    polygons = read_polygons(path, name, choose)
+    with parsing(polygons.source, _format(polygons.source)):
+        return polygons.triangles()
 
 
 def read_polygons(path: str | os.PathLike[str], name: str | None = None, choose: Choice = None) -> PolygonMesh:
@@ -90,7 +92,7 @@ def read_polygons(path: str | os.PathLike[str], name: str | None = None, choose:
         raise MeshError(f"{given}: the file is empty")
     with parsing(given, suffix):
         raw = _parsed(data, given, suffix, choose)
-    return PolygonMesh(raw.vertices, raw.corners, raw.sizes, name or _stem(given), given, raw.notes)
+        return PolygonMesh(raw.vertices, raw.corners, raw.sizes, name or _stem(given), given, raw.notes)
 
 
 def _format(path: str) -> str:
