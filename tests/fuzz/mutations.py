@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+import gzip
+import io
 import random
 import re
+import zipfile
 import zlib
+from collections.abc import Callable
+from typing import TypeAlias
+
+Way: TypeAlias = Callable[[bytes, random.Random], bytes]
+
 
 EXTREME = [b"\0", b"\xff", b"\x7f", b"\x80", b"\xff" * 4, b"\0" * 4, b"\xff" * 8, b"\xff\xff\xff\x7f", b"\0\0\0\x80"]
 WORDS = [b"-1", b"0", b"1e999", b"nan", b"99999999999999999999", b"4294967295", b"1e6", b"-0", b"3.5", b"x", b"", b"\0"]
@@ -92,17 +100,32 @@ def _lines(data: bytes, rng: random.Random) -> bytes:
 
 
 def _inside(data: bytes, rng: random.Random) -> bytes:
-    """Damage what is inside of a deflated part (of .mat, .npz, .gz) and pack it again, so that it arrives."""
+    """Damage what is inside of a packed file and pack it again, so that the damage arrives at the parser."""
+    damage = rng.choice(_WAYS)
+    if data.startswith(b"\x1f\x8b"):
+        return gzip.compress(damage(gzip.decompress(data), rng))
+    if data.startswith(b"PK"):
+        return _inside_zip(data, damage, rng)
     for start in (m.start() for m in re.finditer(rb"\x78\x9c", data)):
         stream = zlib.decompressobj()
         try:
             content = stream.decompress(data[start:])
         except zlib.error:
             continue
-        packed = zlib.compress(rng.choice(_WAYS)(content or b" ", rng))
+        packed = zlib.compress(damage(content or b" ", rng))
         size = len(packed).to_bytes(4, "little") if data[:6] == b"MATLAB" else data[start - 4 : start]
         return data[: start - 4] + size + packed + stream.unused_data
     return data
+
+
+def _inside_zip(data: bytes, damage: Way, rng: random.Random) -> bytes:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(data)) as old, zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as new:
+        chosen = rng.choice(old.namelist())
+        for name in old.namelist():
+            content = old.read(name)
+            new.writestr(name, damage(content, rng) if name == chosen else content)
+    return stream.getvalue()
 
 
 _WAYS = [_flip, _byte, _extreme, _extreme, _cut, _drop, _double, _exchange, _number, _number, _word, _lines]
