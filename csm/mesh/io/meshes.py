@@ -16,7 +16,7 @@ from csm.errors import DataError, MeshError
 from csm.mesh.io.choice import Choice
 from csm.mesh.io.files import atomic_path, read_bytes, read_bytes_of_head
 from csm.mesh.io.gltf import Fetch, parse_gltf
-from csm.mesh.io.guard import inflate, parsing
+from csm.mesh.io.guard import inflate, most_unpacked, parsing
 from csm.mesh.io.matlab import parse_mat
 from csm.mesh.io.npz import parse_npz
 from csm.mesh.io.obj import format_obj, parse_obj
@@ -113,7 +113,7 @@ def _stem(path: str) -> str:
 def _parsed(data: bytes, path: str, suffix: str, choose: Choice) -> RawMesh:
     notes: tuple[str, ...] = ()
     if path.lower().endswith(".gz"):
-        data, left = inflate(data)
+        data, left = inflate(data, limit=most_unpacked(len(data)))
         notes = (f"{left} bytes follow the compressed data; they were not read",) if left else ()
     if suffix in _SEVERAL:
         raw = _SEVERAL[suffix](data, choose, lambda name: read_bytes(Path(path).parent / name))

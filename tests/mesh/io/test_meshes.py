@@ -99,6 +99,14 @@ def test_a_damaged_or_cut_gz_is_named(tmp_path):
         read_mesh(tmp_path / "a.off.gz")
 
 
+def test_a_bomb_is_refused_long_before_it_fills_the_memory(tmp_path):
+    (tmp_path / "a.off.gz").write_bytes(gzip.compress(b"\n" * (40 << 20)))
+    with pytest.raises(
+        MeshError, match=r"a\.off\.gz: the compressed data becomes larger than 35 MiB, which is refused"
+    ):
+        read_mesh(tmp_path / "a.off.gz")
+
+
 def test_there_is_no_choice_in_a_format_of_one_shape(tmp_path):
     write_mesh(tmp_path / "a.off", blob(1))
     assert read_mesh(tmp_path / "a.off", choose=0).digest == blob(1).digest
