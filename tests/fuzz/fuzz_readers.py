@@ -13,7 +13,6 @@ import argparse
 import collections
 import os
 import random
-import resource
 import signal
 import sys
 import tempfile
@@ -100,6 +99,8 @@ def in_child(paths: Sequence[Path]) -> list[tuple[int, str]]:
 
 
 def _limit() -> None:
+    import resource  # of POSIX only
+
     if sys.platform == "linux":
         used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
         resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, used + MEMORY))

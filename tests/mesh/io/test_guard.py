@@ -21,12 +21,14 @@ READERS = {
 }
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes in the file system")
 @pytest.mark.parametrize("read", READERS.values(), ids=READERS.keys())
-def test_what_never_ends_is_refused_without_opening_it(tmp_path, read):
+def test_what_never_ends_is_refused_without_opening_it(tmp_path, monkeypatch, read):
+    monkeypatch.chdir(tmp_path)  # the name of a socket may not be long
     os.mkfifo(tmp_path / "pipe.off")
     (tmp_path / "zero.off").symlink_to("/dev/zero")
     with socket.socket(socket.AF_UNIX) as server:
-        server.bind(str(tmp_path / "s.off"))
+        server.bind("s.off")
         for name, kind in (("pipe.off", "a named pipe"), ("zero.off", "a device"), ("s.off", "a socket")):
             with pytest.raises((DataError, MeshError), match=rf"{name}: this is {kind}, wanted a file"):
                 read(tmp_path / name)
@@ -47,7 +49,7 @@ def test_a_file_larger_than_the_bound_is_not_opened(tmp_path):
         read_mesh(tmp_path / "a.off")
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="everything may be read as root")
+@pytest.mark.skipif(getattr(os, "geteuid", lambda: 0)() == 0, reason="everything may be read as root")
 def test_a_file_that_may_not_be_read(tmp_path):
     (tmp_path / "a.off").write_text("OFF")
     (tmp_path / "a.off").chmod(0)
