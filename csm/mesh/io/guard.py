@@ -72,13 +72,17 @@ def parsing(path: str, wanted: str) -> Iterator[None]:
         with np.errstate(all="ignore"):
             yield
     except CsmError as error:
-        message = str(error)
-        raise MeshError(message if message.startswith(f"{path}: ") else f"{path}: {message}") from error.__cause__
+        raise MeshError(f"{path}: {_printable(str(error).removeprefix(f'{path}: '))}") from error.__cause__
     except MemoryError:
         raise MeshError(f"{path}: this needs more memory than there is; the file may be damaged") from None
     except Exception as error:
-        why = " ".join(str(error).split())[:200] or type(error).__name__
+        why = _printable(str(error))[:200] or type(error).__name__
         raise MeshError(f"{path}: this is no {wanted} file, or it is damaged or cut short ({why})") from error
+
+
+def _printable(text: str) -> str:
+    """Return a message in one line; what a file holds may not move the cursor or colour the terminal."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
 def most_unpacked(packed: int) -> int:

@@ -4,6 +4,7 @@ import socket
 import zlib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from csm.errors import DataError, MeshError
@@ -75,6 +76,16 @@ def test_whatever_a_parser_raises_becomes_one_sentence_that_names_the_file(error
         raise error
     with pytest.raises(MeshError, match=r"^\./a\.off: this needs more memory"), parsing("./a.off", ".off"):
         raise MemoryError
+
+
+def test_a_message_is_one_line_whatever_the_file_has_in_its_names(tmp_path):
+    np.savez(tmp_path / "a  b.npz", **{"vertices": np.eye(3), "a\nb\x1b[31m": np.eye(3)})
+    with pytest.raises(MeshError) as caught:
+        read_mesh(tmp_path / "a  b.npz")
+    message = str(caught.value)
+    assert message.startswith(f"{tmp_path / 'a  b.npz'}: ")
+    assert message.isprintable()
+    assert "found vertices, a b [31m" in message
 
 
 def test_inflating_stops_at_the_limit():
