@@ -145,7 +145,7 @@ def real_numbers(values: ArrayLike, what: str) -> FloatArray:
     array = _as_array(values, what)
     if array.dtype.kind not in "iuf":
         raise MeshError(f"{what} are {_kind_in_words(array)}, wanted real numbers")
-    with np.errstate(over="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):  # of wider types and signalling NaN
         return np.array(array, dtype=np.float64, order="C")
 
 
@@ -161,7 +161,8 @@ def whole_numbers(values: ArrayLike, what: str) -> IntArray:
     if array.dtype.kind not in "iuf":
         raise MeshError(f"{what} are {_kind_in_words(array)}, wanted whole numbers")
     if array.dtype.kind == "f":
-        odd = array[~(np.abs(array) < 2.0**53) | (array != np.round(array))]
+        with np.errstate(invalid="ignore"):
+            odd = array[~(np.abs(array) < 2.0**53) | (array != np.round(array))]
         if odd.size:
             raise MeshError(f"{what} hold {odd.flat[0]}, wanted whole numbers: a vertex number has no fraction")
     elif array.dtype == np.uint64:

@@ -1,7 +1,13 @@
 """Reading and writing of meshes, point maps and name lists; with the store and the reports, the only code on the disk.
 
-The parsers of the single formats are functions of bytes, so nothing else than `files` opens a file.  All readers keep
-the order and the number of the vertices, because ground truth and labels are vertex numbers.
+The parsers of the single formats are functions of bytes, so nothing else than `files` and `archives` opens a file, and
+`guard` has the limits on what is opened, unpacked and raised.  All readers keep the order and the number of the
+vertices, because ground truth and labels are vertex numbers.
+
+A reader is csm's own where order, sizes and messages have to be controlled: .off, .obj, .ply, .stl, .vtk (legacy),
+.npz (its headers are read by NumPy), .mat up to v7, and .glb/.gltf, whose files name sizes of memory and other files
+that libraries take on trust.  HDF5 (.mat v7.3) is read by h5py, in a process with limits.  Compressed files and
+archives are unpacked by Python's zlib, zipfile and tarfile.
 """
 
 from csm.mesh.io.archives import unpack, unpacked

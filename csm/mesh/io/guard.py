@@ -9,6 +9,8 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import numpy as np
+
 from csm.errors import CsmError, DataError, MeshError
 
 LARGEST_FILE = 8 << 30
@@ -62,18 +64,33 @@ def require_regular(path: str | os.PathLike[str]) -> int:
 
 @contextmanager
 def parsing(path: str, wanted: str) -> Iterator[None]:
-    """Name the file in the errors of a parser, and make one of whatever a damaged file lets a library raise."""
+    """Name the file in the errors of a parser, and make one of whatever a damaged file lets a library raise.
+
+    NaN and infinities that a file holds are no fault of the arithmetic with them, so NumPy does not warn of these.
+    """
     try:
-        yield
-    except MeshError as error:
-        raise MeshError(f"{path}: {error}") from error.__cause__
-    except CsmError:
-        raise
+        with np.errstate(all="ignore"):
+            yield
+    except CsmError as error:
+        raise MeshError(f"{path}: {_printable(str(error).removeprefix(f'{path}: '))}") from error.__cause__
     except MemoryError:
         raise MeshError(f"{path}: this needs more memory than there is; the file may be damaged") from None
     except Exception as error:
-        why = " ".join(str(error).split())[:200] or type(error).__name__
+        why = _printable(str(error))[:200] or type(error).__name__
         raise MeshError(f"{path}: this is no {wanted} file, or it is damaged or cut short ({why})") from error
+
+
+def _printable(text: str) -> str:
+    """Return a message in one line; what a file holds may not move the cursor or colour the terminal."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
+
+
+def most_unpacked(packed: int) -> int:
+    """Return how many bytes a compressed mesh of `packed` bytes may become.
+
+    Meshes are packed to a third or so; what becomes a hundred times larger is no mesh but made to fill the memory.
+    """
+    return min(LARGEST_UNPACKED, (32 << 20) + 100 * packed)
 
 
 def inflate(data: bytes, wbits: int = 31, limit: int = LARGEST_UNPACKED) -> tuple[bytes, int]:

@@ -14,6 +14,7 @@ from csm._types import IntArray
 from csm.errors import DataError, MeshError
 from csm.mesh.correspondence import Direction, PointMap
 from csm.mesh.io.files import atomic_path, read_bytes
+from csm.mesh.io.guard import parsing
 from csm.mesh.io.matlab import label_vector
 from csm.mesh.io.raw import is_number
 
@@ -67,7 +68,6 @@ def read_labels(path: str | os.PathLike[str], *, direction: Direction, base: int
     DataError
         If the file is missing, is not a list of whole numbers, or has numbers outside of base..n_to-1+base.
     """
-    path = Path(path)
     numbers = _numbers(path)
     bad = np.flatnonzero(((numbers < base) & (numbers != -1)) | (numbers >= n_to + base))
     if bad.size:
@@ -80,35 +80,37 @@ def read_labels(path: str | os.PathLike[str], *, direction: Direction, base: int
     return PointMap(np.where(numbers == -1, -1, numbers - base), direction, n_to, str(path))
 
 
-def _numbers(path: Path) -> IntArray:
-    values = _mat_numbers(path) if path.suffix.lower() == ".mat" else _text_numbers(path)
+def _numbers(path: str | os.PathLike[str]) -> IntArray:
+    values = _mat_numbers(path) if Path(path).suffix.lower() == ".mat" else _text_numbers(path)
     if values.size == 0:
         raise DataError(f"{path}: the file holds no numbers")
-    whole = np.isfinite(values) & (values == np.round(values))
+    whole = (np.abs(values) < 2.0**53) & (values == np.round(values))
     if not whole.all():
         first = int(np.flatnonzero(~whole)[0])
         raise DataError(f"{path}: entry {first + 1} is {values[first]}, wanted a whole number")
     return values.astype(np.int64)
 
 
-def _mat_numbers(path: Path) -> NDArray[Any]:
+def _mat_numbers(path: str | os.PathLike[str]) -> NDArray[Any]:
+    data = read_bytes(path)
     try:
-        return label_vector(read_bytes(path))
+        with parsing(os.fspath(path), ".mat"):
+            return label_vector(data)
     except MeshError as error:
-        raise DataError(f"{path}: {error}") from error
+        raise DataError(str(error)) from error.__cause__
 
 
-def _text_numbers(path: Path) -> NDArray[Any]:
+def _text_numbers(path: str | os.PathLike[str]) -> NDArray[Any]:
     lines = _lines(path)
     words = lines[0].split() if len(lines) == 1 else lines
     try:
         return np.array(words, dtype=np.float64)
     except ValueError:
         first = next(i for i, word in enumerate(words) if not is_number(word))
-        raise DataError(f"{path}: entry {first + 1} is {words[first]!r}, wanted one number per line") from None
+        raise DataError(f"{path}: entry {first + 1} is {words[first][:80]!r}, wanted one number per line") from None
 
 
-def _lines(path: Path) -> list[str]:
+def _lines(path: str | os.PathLike[str]) -> list[str]:
     """Return the lines of a text file that are more than a comment, without comments and surrounding blanks."""
     text = read_bytes(path).decode("utf-8-sig", errors="replace")
     if "#" in text:
@@ -118,7 +120,7 @@ def _lines(path: Path) -> list[str]:
 
 def read_names(path: str | os.PathLike[str]) -> list[str]:
     """Read a list of shape names, one per line, as the files of a split have them."""
-    return _lines(Path(path))
+    return _lines(path)
 
 
 def read_pairs(path: str | os.PathLike[str]) -> list[tuple[str, str]]:
@@ -130,10 +132,10 @@ def read_pairs(path: str | os.PathLike[str]) -> list[tuple[str, str]]:
         If the file is missing or a line does not hold two names.
     """
     pairs = []
-    for i, line in enumerate(_lines(Path(path))):
+    for i, line in enumerate(_lines(path)):
         names = line.replace(",", " ").split()
         if len(names) != 2:
-            raise DataError(f"{path}: entry {i + 1} is {line!r}, wanted two names")
+            raise DataError(f"{path}: entry {i + 1} is {line[:80]!r}, wanted two names")
         pairs.append((names[0], names[1]))
     return pairs
 

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from csm.errors import DataError, MeshError
 from csm.mesh.io.choice import Choice
 from csm.mesh.io.files import atomic_path, read_bytes, read_bytes_of_head
-from csm.mesh.io.guard import inflate, parsing
+from csm.mesh.io.gltf import Fetch, parse_gltf
+from csm.mesh.io.guard import inflate, most_unpacked, parsing
 from csm.mesh.io.matlab import parse_mat
 from csm.mesh.io.npz import parse_npz
 from csm.mesh.io.obj import format_obj, parse_obj
@@ -23,13 +24,23 @@ from csm.mesh.io.off import count_off, format_off, parse_off
 from csm.mesh.io.ply import counts_ply, format_ply, parse_ply
 from csm.mesh.io.raw import RawMesh
 from csm.mesh.io.stl import parse_stl
+from csm.mesh.io.vtk import parse_vtk
 from csm.mesh.polygons import PolygonMesh
 from csm.mesh.shape import Mesh
 
 _ONE: Mapping[str, Callable[[bytes], RawMesh]] = MappingProxyType(
-    {".off": parse_off, ".ply": parse_ply, ".obj": parse_obj, ".stl": parse_stl, ".npz": parse_npz}
+    {
+        ".off": parse_off,
+        ".ply": parse_ply,
+        ".obj": parse_obj,
+        ".stl": parse_stl,
+        ".npz": parse_npz,
+        ".vtk": parse_vtk,
+    }
 )
-_SEVERAL: Mapping[str, Callable[[bytes, Choice], RawMesh]] = MappingProxyType({".mat": parse_mat})
+_SEVERAL: Mapping[str, Callable[[bytes, Choice, Fetch], RawMesh]] = MappingProxyType(
+    {".mat": lambda data, choose, _: parse_mat(data, choose), ".glb": parse_gltf, ".gltf": parse_gltf}
+)
 
 READABLE: tuple[str, ...] = (*_ONE, *_SEVERAL)
 """Suffixes of the formats that are read; each may be followed by .gz."""
@@ -38,7 +49,7 @@ WRITABLE: tuple[str, ...] = (".off", ".ply", ".obj")
 
 
 def read_mesh(path: str | os.PathLike[str], name: str | None = None, choose: Choice = None) -> Mesh:
-    """Read a triangle mesh; the suffix (.off .ply .obj .stl .npz .mat, each also .gz) says the format.
+    """Read a triangle mesh; the suffix (.off .ply .obj .stl .npz .vtk .mat .glb .gltf, each also .gz) says the format.
 
     Vertex order and number are the file's: nothing is merged, split, dropped or scaled.  The triangles of an
     .stl file share no vertices and are not joined.  What the reader noticed is in the mesh's `notes`.
@@ -50,7 +61,7 @@ def read_mesh(path: str | os.PathLike[str], name: str | None = None, choose: Cho
     name
         Name of the mesh; without it the file name without suffix.
     choose
-        Which shape of a file that holds several (.mat): its number, counted from 0, or "all" to join them.
+        Which shape of a file that holds several (.mat, .glb, .gltf): its number, counted from 0, or "all" to join them.
 
     Raises
     ------
@@ -58,7 +69,9 @@ def read_mesh(path: str | os.PathLike[str], name: str | None = None, choose: Cho
         If the file is missing, damaged, of another format, not a triangle mesh, or a face refers to a vertex that
         does not exist (a 1-based file is named as such).
     """
-    return read_polygons(path, name, choose).triangles()
+    polygons = read_polygons(path, name, choose)
+    with parsing(polygons.source, _format(polygons.source)):
+        return polygons.triangles()
 
 
 def read_polygons(path: str | os.PathLike[str], name: str | None = None, choose: Choice = None) -> PolygonMesh:
@@ -79,7 +92,7 @@ def read_polygons(path: str | os.PathLike[str], name: str | None = None, choose:
         raise MeshError(f"{given}: the file is empty")
     with parsing(given, suffix):
         raw = _parsed(data, given, suffix, choose)
-    return PolygonMesh(raw.vertices, raw.corners, raw.sizes, name or _stem(given), given, raw.notes)
+        return PolygonMesh(raw.vertices, raw.corners, raw.sizes, name or _stem(given), given, raw.notes)
 
 
 def _format(path: str) -> str:
@@ -100,19 +113,15 @@ def _stem(path: str) -> str:
 def _parsed(data: bytes, path: str, suffix: str, choose: Choice) -> RawMesh:
     notes: tuple[str, ...] = ()
     if path.lower().endswith(".gz"):
-        data, left = inflate(data)
+        data, left = inflate(data, limit=most_unpacked(len(data)))
         notes = (f"{left} bytes follow the compressed data; they were not read",) if left else ()
-    raw = _parser(suffix, choose)(data)
-    return replace(raw, notes=notes + raw.notes)
-
-
-def _parser(suffix: str, choose: Choice) -> Callable[[bytes], RawMesh]:
     if suffix in _SEVERAL:
-        parse = _SEVERAL[suffix]
-        return lambda data: parse(data, choose)
-    if choose not in (None, 0, "all"):
+        raw = _SEVERAL[suffix](data, choose, lambda name: read_bytes(Path(path).parent / name))
+    elif choose in (None, 0, "all"):
+        raw = _ONE[suffix](data)
+    else:
         raise MeshError(f"a {suffix} file holds one shape, so there is no choose={choose!r}")
-    return _ONE[suffix]
+    return replace(raw, notes=notes + raw.notes)
 
 
 def count_vertices(path: str | os.PathLike[str]) -> int:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from csm.errors import MeshError
-from csm.mesh.io.guard import LARGEST_UNPACKED
+from csm.mesh.io.guard import most_unpacked
 from csm.mesh.io.raw import RawMesh
 from csm.mesh.shape import real_numbers, whole_numbers
 
@@ -51,7 +51,7 @@ def _member(archive: zipfile.ZipFile, members: dict[str, zipfile.ZipInfo], name:
         raise MeshError(f"'{name}' is encrypted; csm reads plain archives only")
     if info.compress_type not in _METHODS:
         raise MeshError(f"'{name}' is compressed with method {info.compress_type}, which csm does not know")
-    if info.file_size > min(LARGEST_UNPACKED, 2000 * info.compress_size + 4096):
+    if info.file_size > most_unpacked(info.compress_size):
         raise MeshError(
             f"'{name}' announces {info.file_size} bytes, packed into {info.compress_size}: more than csm unpacks"
         )

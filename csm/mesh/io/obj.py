@@ -73,7 +73,7 @@ def _require_existing(corners: np.ndarray, sizes: np.ndarray, n_vertices: int) -
 
 def _notes(corners: np.ndarray, n_vertices: int) -> tuple[str, ...]:
     unused = n_vertices - len(np.unique(corners))
-    if not unused or not len(corners):
+    if not unused:
         return ()
     return (f"{unused} of {n_vertices} vertices belong to no face; if that is unexpected, the file was cut short",)
 

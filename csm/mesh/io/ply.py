@@ -7,11 +7,10 @@ import codecs
 import numpy as np
 from numpy.typing import NDArray
 
-from csm._types import IntArray
 from csm.errors import MeshError
 from csm.mesh.io.ply_header import read_header
 from csm.mesh.io.ply_rows import Column, read_elements
-from csm.mesh.io.raw import RawMesh
+from csm.mesh.io.raw import RawMesh, strip_triangles
 from csm.mesh.shape import Mesh, whole_numbers
 
 
@@ -64,33 +63,6 @@ def _indices(columns: dict[str, Column], element: str) -> Column:
     raise MeshError(
         f"the element '{element}' has no list 'vertex_indices', but {', '.join(columns)[:100] or 'nothing'}"
     )
-
-
-def strip_triangles(corners: IntArray, sizes: IntArray) -> tuple[IntArray, int]:
-    """Return the triangles of strips, shape (M, 3), and how many were left out because they name a vertex twice.
-
-    Parameters
-    ----------
-    corners
-        The vertices of all strips, one strip after the other; -1 begins a new strip within one.
-    sizes
-        How many entries each strip has.
-    """
-    if len(corners) < 3:
-        return np.zeros((0, 3), dtype=np.int64), 0
-    begins = corners == -1
-    begins[(np.cumsum(sizes) - sizes)[sizes > 0]] = True
-    strip = np.cumsum(begins)
-    # A strip that begins with the mark of a restart has its first corner one entry later.
-    first = np.flatnonzero(begins) + (corners[begins] == -1)
-    windows = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
-    inside = (strip[:-2] == strip[2:]) & (windows != -1).all(axis=1)
-    odd = (np.arange(len(windows)) - first[strip[:-2] - 1]) % 2 == 1
-    windows[odd] = windows[odd][:, [1, 0, 2]]
-    triangles = windows[inside]
-    a, b, c = triangles.T
-    proper = (a != b) & (b != c) & (c != a)
-    return triangles[proper], int((~proper).sum())
 
 
 def counts_ply(data: bytes) -> tuple[int, int]:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from csm._types import FloatArray
+from csm._types import FloatArray, IntArray
 from csm.errors import MeshError
 
 
@@ -75,6 +75,33 @@ def coordinates(rows: Sequence[Sequence[str]]) -> FloatArray:
             if len(row) < 3 or not all(is_number(word) for word in row[:3]):
                 raise MeshError(f"vertex {i} is {' '.join(row)[:80]!r}, wanted three numbers") from None
         raise
+
+
+def strip_triangles(corners: IntArray, sizes: IntArray) -> tuple[IntArray, int]:
+    """Return the triangles of strips, shape (M, 3), and how many were left out because they name a vertex twice.
+
+    Parameters
+    ----------
+    corners
+        The vertices of all strips, one strip after the other; -1 begins a new strip within one.
+    sizes
+        How many entries each strip has.
+    """
+    if len(corners) < 3:
+        return np.zeros((0, 3), dtype=np.int64), 0
+    begins = corners == -1
+    begins[(np.cumsum(sizes) - sizes)[sizes > 0]] = True
+    strip = np.cumsum(begins)
+    # A strip that begins with the mark of a restart has its first corner one entry later.
+    first = np.flatnonzero(begins) + (corners[begins] == -1)
+    windows = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
+    inside = (strip[:-2] == strip[2:]) & (windows != -1).all(axis=1)
+    odd = (np.arange(len(windows)) - first[strip[:-2] - 1]) % 2 == 1
+    windows[odd] = windows[odd][:, [1, 0, 2]]
+    triangles = windows[inside]
+    a, b, c = triangles.T
+    proper = (a != b) & (b != c) & (c != a)
+    return triangles[proper], int((~proper).sum())
 
 
 def is_number(word: str) -> bool:

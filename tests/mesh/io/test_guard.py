@@ -4,6 +4,7 @@ import socket
 import zlib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from csm.errors import DataError, MeshError
@@ -21,12 +22,14 @@ READERS = {
 }
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes in the file system")
 @pytest.mark.parametrize("read", READERS.values(), ids=READERS.keys())
-def test_what_never_ends_is_refused_without_opening_it(tmp_path, read):
+def test_what_never_ends_is_refused_without_opening_it(tmp_path, monkeypatch, read):
+    monkeypatch.chdir(tmp_path)  # the name of a socket may not be long
     os.mkfifo(tmp_path / "pipe.off")
     (tmp_path / "zero.off").symlink_to("/dev/zero")
     with socket.socket(socket.AF_UNIX) as server:
-        server.bind(str(tmp_path / "s.off"))
+        server.bind("s.off")
         for name, kind in (("pipe.off", "a named pipe"), ("zero.off", "a device"), ("s.off", "a socket")):
             with pytest.raises((DataError, MeshError), match=rf"{name}: this is {kind}, wanted a file"):
                 read(tmp_path / name)
@@ -47,7 +50,7 @@ def test_a_file_larger_than_the_bound_is_not_opened(tmp_path):
         read_mesh(tmp_path / "a.off")
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="everything may be read as root")
+@pytest.mark.skipif(getattr(os, "geteuid", lambda: 0)() == 0, reason="everything may be read as root")
 def test_a_file_that_may_not_be_read(tmp_path):
     (tmp_path / "a.off").write_text("OFF")
     (tmp_path / "a.off").chmod(0)
@@ -73,6 +76,16 @@ def test_whatever_a_parser_raises_becomes_one_sentence_that_names_the_file(error
         raise error
     with pytest.raises(MeshError, match=r"^\./a\.off: this needs more memory"), parsing("./a.off", ".off"):
         raise MemoryError
+
+
+def test_a_message_is_one_line_whatever_the_file_has_in_its_names(tmp_path):
+    np.savez(tmp_path / "a  b.npz", **{"vertices": np.eye(3), "a\nb\x1b[31m": np.eye(3)})
+    with pytest.raises(MeshError) as caught:
+        read_mesh(tmp_path / "a  b.npz")
+    message = str(caught.value)
+    assert message.startswith(f"{tmp_path / 'a  b.npz'}: ")
+    assert message.isprintable()
+    assert "found vertices, a b [31m" in message
 
 
 def test_inflating_stops_at_the_limit():

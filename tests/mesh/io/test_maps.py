@@ -53,6 +53,8 @@ def test_a_map_read_the_wrong_way_round_is_explained(tmp_path):
         ("1\nnan\n", "whole number"),
         ("1\nx\n", "one number per line"),
         ("1 2\n3 1\n", "entry 1 is '1 2', wanted one number per line"),
+        ("1\n1e300\n", r"entry 2 is 1e\+300, wanted a whole number"),
+        ("1\n-inf\n", "whole number"),
         ("", "no numbers"),
     ],
 )
@@ -124,3 +126,23 @@ def test_a_vts_file_cannot_say_none(tmp_path):
     with pytest.raises(DataError, match="maps are written as"):
         write_map(tmp_path / "m.csv", np.array([0]))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_errors_name_the_file_as_it_was_given(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.txt").write_text("x\n")
+    (tmp_path / "a.mat").write_bytes(b"x")
+    for typed in ("./a.txt", "../" + tmp_path.name + "/a.txt", "./a.mat"):
+        with pytest.raises(DataError) as caught:
+            read_labels(typed, direction=TO_SHAPE, base=0, n_to=3)
+        assert str(caught.value).startswith(typed + ": ")
+
+
+def test_labels_of_a_damaged_mat_are_one_sentence(tmp_path):
+    whole = tmp_path / "a.mat"
+    scipy.io.savemat(whole, {"labels": np.arange(5.0)})
+    data = whole.read_bytes()
+    for end in range(1, len(data), 9):
+        whole.write_bytes(data[:end])
+        with pytest.raises(DataError, match=r"a\.mat: "):
+            read_labels(whole, direction=TO_SHAPE, base=0, n_to=5)

@@ -1,4 +1,6 @@
+import collections
 import gzip
+import random
 
 import numpy as np
 import pytest
@@ -9,6 +11,9 @@ from hypothesis.extra.numpy import arrays
 from csm.errors import MeshError
 from csm.mesh.io import READABLE, WRITABLE, count_vertices, read_mesh, read_polygons, write_mesh
 from csm.mesh.shape import Mesh
+from tests.fuzz.fuzz_readers import FOUND, REFUSED, SOUND, attempt
+from tests.fuzz.mutations import mutated
+from tests.fuzz.seeds import seeds
 from tests.shapes import blob, sphere
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
@@ -94,6 +99,14 @@ def test_a_damaged_or_cut_gz_is_named(tmp_path):
         read_mesh(tmp_path / "a.off.gz")
 
 
+def test_a_bomb_is_refused_long_before_it_fills_the_memory(tmp_path):
+    (tmp_path / "a.off.gz").write_bytes(gzip.compress(b"\n" * (40 << 20)))
+    with pytest.raises(
+        MeshError, match=r"a\.off\.gz: the compressed data becomes larger than 35 MiB, which is refused"
+    ):
+        read_mesh(tmp_path / "a.off.gz")
+
+
 def test_there_is_no_choice_in_a_format_of_one_shape(tmp_path):
     write_mesh(tmp_path / "a.off", blob(1))
     assert read_mesh(tmp_path / "a.off", choose=0).digest == blob(1).digest
@@ -152,6 +165,36 @@ def test_colours_are_checked(tmp_path):
     with pytest.raises(MeshError, match=r"does not write \.stl"):
         write_mesh(tmp_path / "a.stl", mesh)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_long_header_is_counted_too(tmp_path):
+    write_mesh(tmp_path / "a.ply", sphere(1))
+    data = (tmp_path / "a.ply").read_bytes()
+    (tmp_path / "a.ply").write_bytes(
+        data.replace(b"element vertex", b"comment " + b"x" * 70000 + b"\nelement vertex", 1)
+    )
+    assert count_vertices(tmp_path / "a.ply") == 42
+
+
+def test_thousands_of_damaged_files_are_read_or_refused_in_one_sentence(tmp_path):
+    """The short form of `python -m tests.fuzz.fuzz_readers`; HDF5 has a process of its own and is left to that."""
+    rng = random.Random(13)
+    known = [(suffix, data) for suffix, data in seeds() if b"\x89HDF" not in data[:520]]
+    outcomes = collections.Counter()
+    for _ in range(2000):
+        suffix, data = rng.choice(known)
+        path = tmp_path / f"mesh{suffix}"
+        path.write_bytes(mutated(data, rng))
+        outcome, why = attempt(path)
+        outcomes[outcome] += 1
+        assert outcome != FOUND, why
+    assert min(outcomes[SOUND], outcomes[REFUSED]) > 150
+
+
+@pytest.mark.parametrize(("suffix", "data"), [*seeds()])
+def test_the_files_that_are_damaged_there_are_sound(tmp_path, suffix, data):
+    (tmp_path / f"a{suffix}").write_bytes(data)
+    assert read_polygons(tmp_path / f"a{suffix}").n_vertices in (12, 60)
 
 
 @pytest.mark.data

@@ -1,8 +1,14 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from csm.errors import MeshError
-from csm.mesh.io.obj import parse_obj
+from csm.mesh.io import read_mesh
+from csm.mesh.io.obj import format_obj, parse_obj
+from tests.shapes import blob
+
+CASES = Path(__file__).parents[2] / "cases"
 
 POINTS = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
 VERTICES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
@@ -64,6 +70,7 @@ def test_polygons_are_kept_with_their_corners():
 def test_vertices_of_no_face_are_a_note_since_a_cut_file_has_them():
     (note,) = parse_obj((POINTS + "f 1 2 3\n").encode()).notes
     assert "1 of 4 vertices belong to no face" in note
+    assert "4 of 4 vertices belong to no face" in parse_obj(POINTS.encode()).notes[0]
     assert parse_obj((POINTS + "f 1 2 3\nf 1 2 4\n").encode()).notes == ()
 
 
@@ -72,3 +79,29 @@ def test_a_byte_order_mark_costs_no_vertex(encoding):
     raw = parse_obj((POINTS + "f 1 3 2\nf 1 2 4\n").encode(encoding))
     np.testing.assert_array_equal(raw.vertices, VERTICES)
     np.testing.assert_array_equal(raw.faces, TRIANGLES)
+
+
+@pytest.mark.parametrize("name", ["cut_in_face_line", "empty_face_line"])
+def test_cases_that_were_cut_are_named_and_not_told_to_triangulate(name):
+    with pytest.raises(MeshError, match=rf"{name}\.obj: the file ends in the middle of face 12(79|80)") as caught:
+        read_mesh(CASES / f"{name}.obj")
+    assert "triang" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["bom.obj", "bom.off"])
+def test_cases_with_a_byte_order_mark_are_the_mesh_of_the_others(name):
+    mesh, reference = read_mesh(CASES / name), read_mesh(CASES / "plain.off.gz")
+    np.testing.assert_allclose(mesh.vertices, reference.vertices, atol=1e-12)
+    np.testing.assert_array_equal(mesh.faces, reference.faces)
+
+
+@pytest.mark.parametrize("keep", range(1, 80, 7))
+def test_a_file_cut_anywhere_is_refused_or_noted(keep):
+    """As long as the faces that are left leave a vertex out; a cut behind that only opens a hole."""
+    data = format_obj(blob(1))
+    cut = data[: keep * len(data) // 100]
+    try:
+        raw = parse_obj(cut)
+    except MeshError:
+        return
+    assert raw.notes

@@ -64,6 +64,14 @@ def test_a_count_that_is_too_low_is_a_note(announced):
     assert raw.notes == (f"the head announces {announced} triangles, but 80 are there; all of them were read",)
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_signalling_nan_is_a_nan_without_a_warning(tmp_path):
+    (tmp_path / "a.stl").write_bytes(BINARY[:96] + bytes.fromhex("010080ff") * 9 + BINARY[132:])
+    mesh = read_mesh(tmp_path / "a.stl")
+    assert np.isnan(mesh.vertices[:3]).all()
+    assert np.isfinite(mesh.vertices[3:]).all()
+
+
 def test_a_binary_file_that_is_cut_says_so():
     with pytest.raises(MeshError, match="announces 80 triangles, but only 79 are there: the file is cut short"):
         parse_stl(BINARY[:-1])
