@@ -57,7 +57,7 @@ PICKLERS = {"pickle", "dill", "joblib", "cloudpickle", "shelve"}
 SAFE_VALUES = {"allow_pickle": False, "weights_only": True}
 
 TESTED_ELSEWHERE = {
-    "commands.app": "commands/test_pipeline.py",
+    "commands.clean": "commands/test_app.py",
     "commands.describe": "commands/test_pipeline.py",
     "commands.evaluate": "commands/test_pipeline.py",
     "commands.groups": "test_configs.py",

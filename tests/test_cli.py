@@ -60,8 +60,10 @@ def test_cfg_job_prints_the_configuration_and_runs_nothing(run, command, tmp_pat
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_hydra_answers_help(run, command, tmp_path):
-    assert "workers: null" in run(command, "--help")
+def test_help_explains_every_command(run, command, tmp_path):
+    text = run(command, "--help")
+    assert text.startswith(f"usage: csm {command} ")
+    assert "  workers=null " in text
     assert list(tmp_path.iterdir()) == []
 
 

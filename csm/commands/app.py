@@ -25,6 +25,7 @@ from csm.commands.help import help_text
 from csm.commands.schema import require_valid
 from csm.commands.words import to_overrides
 from csm.errors import CsmError
+from csm.evaluation.provenance import remember_command
 from csm.mesh.io import atomic_path
 
 Run = Callable[[DictConfig], dict[str, Any]]
@@ -76,6 +77,7 @@ def command(
             if any(argument in _HELP for argument in arguments):
                 print(help_text(config_name, config_name, more()))
                 return None
+            remember_command(sys.argv)
             with _errors_told(config_name, "debug=true" in arguments):
                 sys.argv[1:] = to_overrides(config_name, arguments)
                 with terminable():

@@ -68,10 +68,10 @@ def rows_of(cfg: DictConfig) -> list[Row]:
 def _row(cfg: DictConfig, name: str, seed: int) -> Row:
     overrides = [*map(str, cfg.rows[name]), *map(str, cfg.overrides)]
     train = compose("train", overrides=overrides)
-    require_valid(train)
     require_network_of_recipe(train, overrides)
     with open_dict(train):
         train.update(name=name, seed=seed, store=cfg.store, workers=cfg.workers)
+    require_valid(train)
     return Row(name, seed, partial(make_training, train), identity_of(train))
 
 

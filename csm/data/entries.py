@@ -99,8 +99,12 @@ def write_entry(path: Path, kind: str, mesh: Mesh, params: Mapping[str, Any], ar
     header = np.frombuffer(json.dumps(meta).encode(), dtype=np.uint8)
     if path.is_symlink():
         path.unlink()  # what it points to is not csm's to be overwritten
-    with atomic_path(path) as temporary, temporary.open("wb") as file:
-        np.savez(file, allow_pickle=False, **{_META: header}, **arrays)
+    try:
+        with atomic_path(path) as temporary, temporary.open("wb") as file:
+            np.savez(file, allow_pickle=False, **{_META: header}, **arrays)
+    except DataError as error:
+        why = error.__cause__
+        raise (why if isinstance(why, OSError) else OSError(errno.EEXIST, str(error), str(path))) from None
 
 
 def read_entry(path: Path) -> tuple[Entry, Arrays]:

@@ -17,8 +17,9 @@ from csm._types import Arrays, Float32Array, FloatArray
 from csm.data.shapes import ShapeSet
 from csm.data.store import Store
 from csm.descriptors.base import Descriptor, record
-from csm.errors import CsmError
+from csm.errors import CsmError, MeshError
 from csm.mesh.check import require_usable
+from csm.mesh.debris import body_of, unit_area
 from csm.mesh.shape import Mesh
 from csm.operators import Operators, Spectrum
 from csm.operators.stencils import Stencil
@@ -120,8 +121,13 @@ def features_of(mesh: Mesh, descriptor: Descriptor, store: Store, operators: Ope
             require_usable(mesh)
         return {"values": descriptor(operators or mesh).values.astype(np.float32)}
 
-    values: Float32Array = store.fetch("descriptor", mesh, record(descriptor), make)["values"]
+    values: Float32Array = store.fetch("descriptor", mesh, _key(mesh, descriptor), make)["values"]
     return values
+
+
+def _key(mesh: Mesh, descriptor: Descriptor) -> dict[str, Any]:
+    """Return what a descriptor is looked up by; before version 0.2 debris was not left out, so it has another key."""
+    return record(descriptor) if body_of(mesh).n_debris == 0 else {**record(descriptor), "without": "debris"}
 
 
 def prepare_mesh(mesh: Mesh, recipe: Recipe, store: Store, operators: Operators | None = None) -> Prepared:
@@ -140,6 +146,11 @@ def prepare_mesh(mesh: Mesh, recipe: Recipe, store: Store, operators: Operators 
     features = features_of(mesh, recipe.descriptor, store, operators)
     basis = operators.lbo(recipe.basis_k) if recipe.basis_k else None
     unit = operators.mesh
+    if recipe.stencils and operators.body is not None:
+        raise MeshError(
+            f"{mesh.label}: {body_of(mesh).note}; a network with {recipe.stencils[0].name} cannot leave them out by "
+            "itself: use clean=auto, or csm clean first"
+        )
     stencils = {
         s.name: store.fetch(f"stencil-{s.name}", unit, s.parameters(), partial(s, operators)) for s in recipe.stencils
     }
@@ -148,11 +159,11 @@ def prepare_mesh(mesh: Mesh, recipe: Recipe, store: Store, operators: Operators 
 
 def is_prepared(mesh: Mesh, recipe: Recipe, store: Store) -> bool:
     """Tell whether `prepare_mesh` would find everything in the store; nothing is read."""
-    if not store.has("descriptor", mesh, record(recipe.descriptor)):
+    if not store.has("descriptor", mesh, _key(mesh, recipe.descriptor)):
         return False
     if not recipe.basis_k and not recipe.stencils:
         return True
-    unit = mesh.unit_area()
+    unit = unit_area(mesh)
     return (not recipe.basis_k or store.has("lbo", unit, {"k": recipe.basis_k})) and all(
         store.has(f"stencil-{s.name}", unit, s.parameters()) for s in recipe.stencils
     )

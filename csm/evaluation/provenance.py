@@ -17,6 +17,9 @@ _PACKAGE = Path(csm.__file__).resolve().parent
 _LIBRARIES = ("torch", "lightning", "numpy", "scipy", "pygeodesic", "potpourri3d")
 
 
+_typed: list[str] = []
+
+
 @dataclass(frozen=True)
 class Provenance:
     """What is needed to make a number again.
@@ -44,10 +47,15 @@ def provenance(argv: Sequence[str] | None = None) -> Provenance:
     >>> provenance(["/usr/bin/csm", "train", "experiment=demo", "name=two words"]).command
     "csm train experiment=demo 'name=two words'"
     """
-    words = list(sys.argv if argv is None else argv)
+    words = list((_typed or sys.argv) if argv is None else argv)
     program, *arguments = words or ["python"]
     command = " ".join([_program(program), *map(shlex.quote, arguments)])
     return Provenance(command, _commit() or f"csm {csm.__version__}", _versions())
+
+
+def remember_command(argv: Sequence[str]) -> None:
+    """Keep a command line as it was typed, before it is put into the words of Hydra."""
+    _typed[:] = argv
 
 
 def _program(path: str) -> str:

@@ -93,6 +93,8 @@ class Matrix:
         """
         matchers(self.matching)
         require_device(self.device)
+        if not self.train and not self.folder.exists():
+            return self._fill(rows)
         self.folder.mkdir(parents=True, exist_ok=True)
         kept = f"finished cells are kept in {self.folder}; the same command goes on with the others"
         with locked(self.folder, wait=0), saying(lambda: kept):

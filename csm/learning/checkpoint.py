@@ -6,7 +6,6 @@ import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from pickle import UnpicklingError
 from typing import Any
 
 import torch
@@ -84,12 +83,12 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
         raise DataError(f"{path}: there is no such checkpoint; csm train writes model.ckpt into its output folder")
     try:
         found = torch.load(path, map_location="cpu", weights_only=True)
-    except UnpicklingError as error:
-        raise DataError(
-            f"{path}: not a checkpoint of csm: it holds more than numbers and plain data, and csm loads nothing that "
-            "could run code"
-        ) from error
     except Exception as error:  # a damaged archive makes PyTorch raise whatever it trips over
+        if "weights_only" in str(error):
+            raise DataError(
+                f"{path}: not a checkpoint of csm: it holds more than numbers and plain data, and csm loads nothing "
+                "that could run code"
+            ) from error
         why = (str(error) or type(error).__name__).splitlines()[0]
         raise DataError(f"{path}: not a checkpoint of csm, or it is damaged or cut short ({why})") from error
     if not isinstance(found, dict) or not {"state_dict", "hyper_parameters"} <= found.keys():

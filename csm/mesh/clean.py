@@ -2,6 +2,11 @@
 
 Nothing here is done unasked: vertex numbers are the ground truth, so reading never repairs.  `clean` returns a new mesh
 and both maps, with which labels and correspondences carry over in either direction.
+
+In this order: polygons become triangles; boundary vertices at the same place are welded; faces without three different
+corners and repeated faces go; vertices with faces of zero area only are joined with their nearest neighbour;
+non-manifold edges and vertices are cut apart; debris goes; vertices in no face go; faces are oriented alike, and
+outwards where the surface is closed.
 """
 
 from __future__ import annotations
@@ -80,12 +85,7 @@ def clean(
     orient: bool = True,
     tolerance: float = SAME_PLACE,
 ) -> Cleaned:
-    """Mend a mesh so that descriptors can be computed on it.
-
-    In this order: polygons become triangles; boundary vertices at the same place are welded; faces without three
-    different corners and repeated faces go; vertices with faces of zero area only are joined with their nearest
-    neighbour; non-manifold edges and vertices are cut apart; debris goes; vertices in no face go; faces are oriented
-    alike, and outwards where the surface is closed.
+    """Mend a mesh so that descriptors can be computed on it; the module says in which steps.
 
     Parameters
     ----------
@@ -97,11 +97,6 @@ def clean(
         Components below this fraction of the area go; 0 keeps all.
     tolerance
         Of welding, as a fraction of the bounding box's diagonal.
-
-    Returns
-    -------
-    Cleaned
-        The mesh, the maps between old and new vertices, and what was done.
 
     Raises
     ------

@@ -76,6 +76,12 @@ def component_areas(mesh: Mesh) -> tuple[IntArray, FloatArray]:
     return label, areas.astype(np.float64)
 
 
+def unit_area(mesh: Mesh) -> Mesh:
+    """Return a mesh scaled about the origin so that its body, all of it but the debris, has an area of 1."""
+    body = body_of(mesh)
+    return mesh.unit_area(None if body.n_debris == 0 else body.area)
+
+
 def body_of(mesh: Mesh, debris: float = DEBRIS) -> Body:
     """Return the components of a mesh that have at least the fraction `debris` of its area; the largest always counts.
 

@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 from csm._types import Arrays, FloatArray, IntArray
 from csm.mesh.check import require_usable
 from csm.mesh.debris import Body, body_of
+from csm.mesh.debris import unit_area as with_unit_area
 from csm.mesh.shape import Mesh
 from csm.operators.frames import FrameKind, face_frames
 from csm.operators.laplacian import (
@@ -95,7 +96,7 @@ class Operators:
     def __init__(self, mesh: Mesh, *, unit_area: bool = True, memo: Memo | None = None) -> None:
         require_usable(mesh)
         found = body_of(mesh)
-        self.mesh = mesh.unit_area(found.area) if unit_area else mesh
+        self.mesh = with_unit_area(mesh) if unit_area else mesh
         self._debris = found.note
         self.body = None if found.is_all else _body(self.mesh, found, memo)
         self._memo = memo

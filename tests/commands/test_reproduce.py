@@ -37,17 +37,13 @@ def test_words_are_studies_and_each_leaves_its_files(run, tmp_path, capsys):
     assert files <= {path.name for path in (tmp_path / "outputs/reproduce").iterdir()}
     assert files == {path.name for path in (tmp_path / "shown").iterdir()}
     record = json.loads((tmp_path / "shown/table1.json").read_text())
-    assert record["command"].startswith("csm reproduce 'targets=[table1,figure4]' ")
+    assert record["command"].startswith("csm reproduce table1 ")
     assert "| acd_paper | 77 |" in capsys.readouterr().out
-    result = json.loads((tmp_path / "job/result.json").read_text())
-    assert result["status"] == "ok"
-    assert {"seconds/table1", "seconds/figure4"} <= set(result)
+    assert not (tmp_path / "job").exists()
 
 
 def test_help_lists_the_studies(run, capsys):
-    with pytest.raises(SystemExit) as stopped:
-        run("reproduce", "--help")
-    assert not stopped.value.code
+    run("reproduce", "--help")
     text = capsys.readouterr().out
     for name, study in STUDIES.items():
         assert f"{name} " in text

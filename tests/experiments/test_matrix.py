@@ -14,6 +14,7 @@ from csm.evaluation import EvaluationProtocol
 from csm.evaluation.report import ResultRow, read_rows
 from csm.experiments import matrix as module
 from csm.experiments.matrix import Matrix, Row, require_same_training
+from csm.experiments.resuming import last_checkpoint
 from csm.experiments.training import Training
 from csm.matching.network import load_model
 from tests.experiments.toys import a_training
@@ -29,9 +30,9 @@ class Bench:
         self.folder, self.trained, self.tested = folder, [], []
         fit, measure_set = module.fit, module.measure_set
 
-        def watched_fit(training: Training, place: Path, resume):
-            self.trained.append((training.name, training.seed, resume is not None))
-            return fit(training, place, resume)
+        def watched_fit(training: Training, place: Path):
+            self.trained.append((training.name, training.seed, last_checkpoint(place).exists()))
+            return fit(training, place)
 
         def watched_measure(method, data, shapes, protocol, **options):
             self.tested.append((method.name, shapes.name, tuple(options["matching"])))

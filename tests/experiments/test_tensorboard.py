@@ -62,7 +62,7 @@ def test_without_validation_errors_the_other_panels_are_there(tmp_path):
 
 def test_without_a_tensorboard_log_panels_do_nothing(tmp_path):
     fit(a_training(tmp_path, callbacks=[TensorBoardPanels({"a": 1})]), tmp_path / "run")
-    assert {p.name for p in (tmp_path / "run").iterdir()} == {"model.ckpt", "export", "checkpoints"}
+    assert {p.name for p in (tmp_path / "run").iterdir() if p.name[0] != "."} == {"model.ckpt", "export", "checkpoints"}
 
 
 def test_flatten_keeps_scalars_and_writes_lists_as_text():
