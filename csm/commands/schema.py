@@ -52,7 +52,7 @@ RANGES: Mapping[str, Range] = {
     "unused_days": Range(False, 0, none=True),
     "debris": Range(False, 0, 1),
     "tolerance": Range(False, 0, 1),
-    "trainer.max_epochs": _SOME,
+    "trainer.max_epochs": _COUNT,
     "trainer.check_val_every_n_epoch": _SOME,
     "trainer.log_every_n_steps": _COUNT,
     "trainer.num_sanity_val_steps": Range(True, -1),

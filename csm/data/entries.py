@@ -97,8 +97,8 @@ def write_entry(path: Path, kind: str, mesh: Mesh, params: Mapping[str, Any], ar
         "checksum": checksum(arrays),
     }
     header = np.frombuffer(json.dumps(meta).encode(), dtype=np.uint8)
-    if path.is_symlink():
-        path.unlink()  # what it points to is not csm's to be overwritten
+    if path.is_symlink() or path.is_fifo() or path.is_socket():
+        path.unlink()  # what a link points to is not csm's to be overwritten; a pipe cannot be written
     try:
         with atomic_path(path) as temporary, temporary.open("wb") as file:
             np.savez(file, allow_pickle=False, **{_META: header}, **arrays)

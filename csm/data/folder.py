@@ -13,7 +13,7 @@ from csm.data.splits import Split, as_split
 from csm.errors import DataError
 from csm.mesh.io import list_files
 
-_GEOMETRY, _ARRAYS = (".off", ".ply", ".obj", ".stl"), (".npz", ".mat")
+_GEOMETRY, _ARRAYS = (".off", ".ply", ".obj", ".stl", ".vtk", ".glb", ".gltf"), (".npz", ".mat")
 
 
 def _plain(layout: Layout, folder: Path) -> FolderSet | None:

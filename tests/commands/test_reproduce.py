@@ -32,14 +32,13 @@ def run(monkeypatch, tmp_path):
 def test_words_are_studies_and_each_leaves_its_files(run, tmp_path, capsys):
     write_faust(tmp_path / "data" / "FAUST")
     options = ["table1.sets=[faust]", "table1.descriptors=[acd_paper]", "table1.exact_points=10", "workers=1"]
-    run("reproduce", "table1", *options, "figure4", "results=shown", "hydra.run.dir=job")
+    run("reproduce", "table1", *options, "figure4", "results=shown")
     files = {f"{name}.{suffix}" for name in ("table1", "figure4") for suffix in ("json", "csv", "md", "png")}
     assert files <= {path.name for path in (tmp_path / "outputs/reproduce").iterdir()}
     assert files == {path.name for path in (tmp_path / "shown").iterdir()}
     record = json.loads((tmp_path / "shown/table1.json").read_text())
     assert record["command"].startswith("csm reproduce table1 ")
     assert "| acd_paper | 77 |" in capsys.readouterr().out
-    assert not (tmp_path / "job").exists()
 
 
 def test_help_lists_the_studies(run, capsys):

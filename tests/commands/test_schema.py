@@ -36,7 +36,7 @@ def test_experiments_are_valid(experiment):
     [
         ("seed=-1", "seed=-1: wanted a whole number from 0"),
         ("seed=1.5", "seed=1.5: wanted a whole number"),
-        ("trainer.max_epochs=-5", "trainer.max_epochs=-5: wanted a whole number from 1"),
+        ("trainer.max_epochs=-5", "trainer.max_epochs=-5: wanted a whole number from 0"),
         ("trainer.max_epochs=many", "trainer.max_epochs=many"),
         ("optimizer.lr=nan", "optimizer.lr=nan: wanted a number above 0"),
         ("optimizer.lr=fast", "optimizer.lr=fast"),
