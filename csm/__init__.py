@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from csm.matching.network import load_model
     from csm.mesh import Mesh, PointMap, read_mesh, write_mesh
     from csm.mesh.check import check
+    from csm.mesh.clean import Cleaned, clean
+    from csm.mesh.io import read_polygons
     from csm.operators import Operators
     from csm.operators.geodesic import geodesics
 
@@ -43,6 +45,8 @@ _PLACES = {
     "csm.matching.network": ("load_model",),
     "csm.mesh": ("Mesh", "PointMap", "read_mesh", "write_mesh"),
     "csm.mesh.check": ("check",),
+    "csm.mesh.clean": ("Cleaned", "clean"),
+    "csm.mesh.io": ("read_polygons",),
     "csm.operators": ("Operators",),
     "csm.operators.geodesic": ("geodesics",),
 }
@@ -51,6 +55,7 @@ __all__ = [
     "ACD",
     "HKS",
     "WKS",
+    "Cleaned",
     "Evaluation",
     "EvaluationProtocol",
     "Match",
@@ -60,6 +65,7 @@ __all__ = [
     "Store",
     "VertexMap",
     "check",
+    "clean",
     "evaluate",
     "find_set",
     "geodesics",
@@ -69,6 +75,7 @@ __all__ = [
     "match_meshes",
     "preset",
     "read_mesh",
+    "read_polygons",
     "recognise",
     "write_mesh",
 ]

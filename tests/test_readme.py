@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 import re
 import shlex
 import sys
@@ -8,7 +9,9 @@ from pathlib import Path
 import pytest
 from hydra.core.global_hydra import GlobalHydra
 
-from csm.commands.main import COMMANDS, main
+from csm.commands import app
+from csm.commands.main import main
+from csm.commands.schema import require_valid
 from tests.readme_tables import BLOCK, PAGES, ROOT, with_tables
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -48,16 +51,21 @@ def test_every_json_that_a_page_names_is_there():
 
 
 @pytest.mark.parametrize("line", COMMAND_LINES)
-def test_every_command_composes(line, monkeypatch, capsys):
-    """Run the line as it stands up to its configuration, which `--cfg job` prints instead of doing the work."""
-    _, command, *arguments = shlex.split(line)
-    assert command in COMMANDS
-    monkeypatch.setattr("sys.argv", ["csm", command, *(a for a in arguments if a != "-m"), "--cfg", "job"])
-    if "-m" in arguments:  # a sweep is composed with the first of its values
-        sys.argv[2:] = [re.sub(r"=([^,\[]+),.*", r"=\1", argument) for argument in sys.argv[2:]]
+def test_every_command_line_is_taken_as_it_stands(line, monkeypatch, tmp_path):
+    """Run the line, in another folder, up to its jobs: what is typed is parsed, composed and found valid."""
+    jobs = []
+
+    def job(run, cfg, folder, failures):
+        require_valid(cfg)
+        jobs.append(cfg)
+
+    monkeypatch.setattr(app, "_job", job)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", shlex.split(line))
     GlobalHydra.instance().clear()
     main()
-    assert "workers:" in capsys.readouterr().out
+    sweep = re.findall(r"=(\S+,\S+)", line) if " -m " in line else []
+    assert len(jobs) == math.prod(len(values.split(",")) for values in sweep)
 
 
 def test_the_scripts_of_the_data_sets_are_there():

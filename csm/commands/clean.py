@@ -27,7 +27,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     require_file_place(target)
     require_not_input([*files, account_of(target)], [source])
     require_own(files, account_of(target), cfg.overwrite)
-    mesh = read_polygons(source)
+    mesh = read_polygons(source, choose=cfg.choose)
     done = clean(
         mesh, weld=cfg.weld, split=cfg.split, debris=cfg.debris, orient=cfg.orient, tolerance=float(cfg.tolerance)
     )

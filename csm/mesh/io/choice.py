@@ -29,7 +29,7 @@ def chosen(names: Sequence[str], choose: Choice) -> list[int]:
     if choose is None:
         raise MeshError(
             f"it holds {len(names)} shapes ({shown}), wanted one; choose it by its number from 0 to {len(names) - 1}, "
-            'as in csm.read_mesh(..., choose=0), or choose="all" to join them'
+            'as in csm.read_mesh(..., choose=0) or csm clean FILE OUT choose=0, or choose="all" to join them'
         )
     try:
         number = operator.index(choose)  # type: ignore[arg-type]
