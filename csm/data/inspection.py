@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from csm._progress import progress_bar
 from csm.data.base import DataModule
@@ -62,7 +63,8 @@ class Problem:
         The file of the shape, if it has one.
     kind
         "unreadable" (mesh or map, also maps of different length), the kind of a finding of `csm.mesh.check`,
-        "not_exact" (exact geodesic distances cannot be measured), "missing" (shapes of the split) or "no_pairs".
+        "not_exact" (exact geodesic distances cannot be measured), "too_small" (fewer vertices than eigenpairs),
+        "missing" (shapes of the split) or "no_pairs".
     severity
         "error" if training or testing fails with it; "note" if that depends on what is asked for.
     text
@@ -108,9 +110,11 @@ def data_problems(
     progress
         Show a progress bar with the shape's name.
     """
-    found = _part_problems(data.train_set, data.train_names, data.shape, progress) if train else []
+    wanted = max(data.recipe.basis_k, data.recipe.descriptor.eigenpairs)
+    found = _part_problems(data.train_set, data.train_names, data.shape, wanted, progress) if train else []
     for shapes in data.test_sets.values() if test else ():
-        found += _part_problems(shapes, lambda s=shapes: data.test_names(s), shapes.load, progress)  # type: ignore[misc]
+        names = partial(data.test_names, shapes)
+        found += _part_problems(shapes, names, shapes.load, wanted, progress)
         found += _pair_problems(shapes, data)
     return tuple(found)
 
@@ -188,7 +192,11 @@ def _mesh_file(shapes: ShapeSet, name: str) -> str:
 
 
 def _part_problems(
-    shapes: ShapeSet, names: Callable[[], Iterable[str]], load: Callable[[str], Shape], progress: bool
+    shapes: ShapeSet,
+    names: Callable[[], Iterable[str]],
+    load: Callable[[str], Shape],
+    eigenpairs: int,
+    progress: bool,
 ) -> list[Problem]:
     try:
         wanted = list(names())
@@ -202,7 +210,7 @@ def _part_problems(
             bar.set_postfix_str(name, refresh=False)
             rows.append(_loaded(load, name))
     rows = list(_of_one_length(rows, shapes, templates_of(shapes)))
-    return [problem for row in rows for problem in _row_problems(shapes, row)]
+    return [problem for row in rows for problem in _row_problems(shapes, row, eigenpairs)]
 
 
 def _loaded(load: Callable[[str], Shape], name: str) -> Inspected:
@@ -213,9 +221,15 @@ def _loaded(load: Callable[[str], Shape], name: str) -> Inspected:
     return _seen(name, shape.mesh, shape.truth.n_from)
 
 
-def _row_problems(shapes: ShapeSet, row: Inspected) -> list[Problem]:
+def _row_problems(shapes: ShapeSet, row: Inspected, eigenpairs: int = 0) -> list[Problem]:
     file = _mesh_file(shapes, row.name)
     found = [Problem(shapes.name, row.name, file, "unreadable", "error", text) for text in row.problems]
+    if 0 < row.n_vertices < eigenpairs:
+        text = (
+            f"has {row.n_vertices} vertices, but {eigenpairs} eigenpairs are asked for (data.basis_k, descriptor.k); a "
+            "mesh has as many as it has vertices"
+        )
+        found.append(Problem(shapes.name, row.name, file, "too_small", "error", text))
     for finding in row.findings:
         if finding.severity == "error":
             found.append(Problem(shapes.name, row.name, file, finding.kind, "error", finding.text))

@@ -58,7 +58,7 @@ def write_match(match: Match, folder: Path, method: str, seconds: float) -> None
 def _write_confidence(path: Path, match: Match) -> None:
     head = f"# line i = confidence, from 0 to 1, in the match of vertex i of {match.source.name}; 0-based"
     with atomic_path(path) as temporary:
-        lines = [head, *(f"{value:.4f}" for value in match.confidence.values)]
+        lines = [" ".join(head.split()), *(f"{value:.4f}" for value in match.confidence.values)]
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

@@ -11,7 +11,7 @@ from csm.mesh.io import read_mesh, write_map, write_mesh
 from csm.mesh.shape import Mesh
 from tests.data import layouts
 from tests.shapes import sphere
-from tests.toyset import write_toys
+from tests.toyset import toy_datamodule, write_toys
 
 
 def module(root, **options) -> FolderDataModule:
@@ -125,3 +125,11 @@ def test_what_a_split_leaves_is_told_before_the_training(toys):
     assert kinds(module(toys, split=missing)) == [("", "missing", "error"), ("", "no_pairs", "error")]
     several = Split("mine", ("toy0", "toy9"), ("toy2", "toy3"))
     assert kinds(module(toys, split=several)) == [("", "missing", "error")]
+
+
+def test_a_shape_with_fewer_vertices_than_eigenpairs_is_named_before_the_work(tmp_path):
+    data = toy_datamodule(tmp_path, basis_k=163)
+    found = data_problems(data, progress=False)
+    assert {problem.kind for problem in found} == {"too_small"}
+    assert len(found) == 6
+    assert "has 162 vertices, but 163 eigenpairs are asked for" in str(found[0])

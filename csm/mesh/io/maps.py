@@ -168,6 +168,6 @@ def write_map(path: str | os.PathLike[str], indices: IntArray, *, meaning: str =
         if path.suffix == ".npz":
             np.savez(temporary, indices=values, meaning=np.array(meaning))
         else:
-            head = [f"# {meaning}; 0-based, -1 for none"] if path.suffix == ".txt" else []
+            head = [f"# {' '.join(meaning.split())}; 0-based, -1 for none"] if path.suffix == ".txt" else []
             base = 1 if path.suffix == ".vts" else 0
             temporary.write_text("\n".join([*head, *map(str, (values + base).tolist())]) + "\n", encoding="utf-8")
