@@ -12,7 +12,7 @@ import torch
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 
-from csm.errors import CsmError, DataError
+from csm.errors import ConfigError, CsmError, DataError
 from csm.learning.module import CSMModule
 from csm.mesh.io import atomic_path, read_bytes
 
@@ -59,6 +59,8 @@ def load_module(path: str | os.PathLike[str]) -> CSMModule:
     DataError
         If there is no such file, or it is no network of csm.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise ConfigError(f"a checkpoint is given by its path, got a {type(path).__name__}")
     path = Path(path)
     if not path.is_file():
         raise DataError(f"{path}: there is no such checkpoint; csm train writes model.ckpt into its output folder")

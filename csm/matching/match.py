@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,7 +69,7 @@ def match_meshes(
     matcher: Matcher | str = "nearest",
     *,
     clean: Cleaning = "auto",
-    store: Store | None = None,
+    store: Store | str | os.PathLike[str] | None = None,
     device: str = "cpu",
 ) -> Match:
     """Match two meshes.
@@ -86,7 +87,7 @@ def match_meshes(
         "auto" mends copies of the meshes first (`csm.clean`) where they need it; "off" takes them as they are.  The
         result is on the given vertices in either case.
     store
-        Where descriptors and bases are kept; by default csm's store in the user's cache folder.
+        Where descriptors and bases are kept, or its folder; by default csm's store in the user's cache folder.
     device
         Where features are compared and networks run: "cpu", "cuda", ...
 
@@ -109,7 +110,7 @@ def match_meshes(
     >>> csm.match_meshes(humans.mesh("s00_p00"), humans.mesh("s00_p02"), "hks")  # doctest: +SKIP
     Match(s00_p00 -> s00_p02 by hks, nearest)
     """
-    chosen, rule, store = as_method(method), as_matcher(matcher), store or Store()
+    chosen, rule, store = as_method(method), as_matcher(matcher), store if isinstance(store, Store) else Store(store)
     if isinstance(chosen, PrecomputedMethod):
         clean = "off"  # its features are those of the given vertices
     subjects = [subject_of(mesh, clean) for mesh in (source, target)]

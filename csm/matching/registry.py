@@ -33,8 +33,9 @@ def matcher(name: str | Matcher) -> Matcher:
     """
     if isinstance(name, Matcher):
         return name
-    if name not in MATCHERS:
-        raise ConfigError(f"matching={name!r}; wanted {' or '.join(MATCHERS)}")
+    if not isinstance(name, str) or name not in MATCHERS:
+        shown = repr(name) if isinstance(name, str) else f"a {type(name).__name__}"
+        raise ConfigError(f"matching={shown}; wanted {' or '.join(MATCHERS)}")
     return MATCHERS[name]()
 
 

@@ -70,8 +70,9 @@ def subject_of(mesh: MeshLike, cleaning: Cleaning = "auto") -> Subject:
     MeshError
         If the file cannot be read, or cleaning is off and the mesh cannot be used.
     """
-    if cleaning not in get_args(Cleaning):
-        raise ConfigError(f"clean={cleaning}; wanted {' or '.join(get_args(Cleaning))}")
+    if not isinstance(cleaning, str) or cleaning not in get_args(Cleaning):
+        shown = cleaning if isinstance(cleaning, str) else f"a {type(cleaning).__name__}"
+        raise ConfigError(f"clean={shown}; wanted {' or '.join(get_args(Cleaning))}")
     polygons = _read(mesh)
     if isinstance(polygons, PolygonMesh) and (cleaning == "off" or polygons.all_triangles):
         polygons = polygons.triangles()

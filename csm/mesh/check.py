@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from csm._types import BoolArray, IntArray
 from csm.errors import MeshError
 from csm.mesh.debris import DEBRIS, body_of
-from csm.mesh.shape import Mesh
+from csm.mesh.shape import Mesh, require_mesh
 from csm.mesh.topology import components, edge_keys
 
 Severity = Literal["error", "note"]
@@ -67,7 +67,7 @@ def check(mesh: Mesh) -> tuple[Finding, ...]:
     >>> [(f.kind, f.count, f.first, f.severity) for f in check(square)]
     [('unreferenced_vertices', 1, (3,), 'note'), ('boundary', 3, (0, 1, 2), 'note')]
     """
-    topology = _Topology(mesh)
+    topology = _Topology(require_mesh(mesh))
     finite = bool(np.isfinite(mesh.vertices[topology.referenced]).all())
     tests: list[Callable[[_Topology], Iterator[Finding]]] = [_faces, _references, _edges, _fans, _components]
     tests = [*tests, _degenerate, _duplicates, _scale] if finite else [_non_finite, *tests]

@@ -21,7 +21,7 @@ from csm.mesh.check import FLAT
 from csm.mesh.debris import DEBRIS, body_of
 from csm.mesh.mending import collapsed, sound_faces, split, turns, welded
 from csm.mesh.polygons import PolygonMesh, triangulated
-from csm.mesh.shape import Mesh
+from csm.mesh.shape import Mesh, require_mesh
 
 SAME_PLACE = 1e-7
 """Distance below which boundary vertices are welded, as a fraction of the bounding box's diagonal."""
@@ -115,7 +115,7 @@ def clean(
     for name, value in (("debris", debris), ("tolerance", tolerance)):
         if not 0 <= value < 1:
             raise ConfigError(f"{name}={value}; wanted a fraction from 0 to below 1")
-    work = _Work.of(mesh)
+    work = _Work.of(mesh if isinstance(mesh, PolygonMesh) else require_mesh(mesh))
     unsound = work.drop_unsound_faces()  # a face that is there twice has no boundary to be welded
     if weld:
         work.weld(tolerance)

@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import dijkstra
 from csm._types import BoolArray, FloatArray, IntArray
 from csm.errors import ConfigError, MeshError
 from csm.mesh.check import check
-from csm.mesh.shape import Mesh
+from csm.mesh.shape import Mesh, require_mesh
 from csm.mesh.topology import components, edge_graph, half_edges
 from csm.operators._pairs import PairPlan, plan_pairs
 
@@ -78,7 +78,7 @@ def geodesics(mesh: Mesh, method: Method = "exact") -> Geodesics:
     kinds: dict[str, type[_OnMesh]] = {"exact": _Exact, "heat": _Heat, "edge": _Edge}
     if method not in kinds:
         raise ConfigError(f"geodesic method {method!r} is unknown: choose one of {', '.join(get_args(Method))}")
-    return kinds[method](mesh)
+    return kinds[method](require_mesh(mesh))
 
 
 class _OnMesh:

@@ -16,7 +16,7 @@ from csm._types import Arrays, FloatArray, IntArray
 from csm.mesh.check import require_usable
 from csm.mesh.debris import Body, body_of
 from csm.mesh.debris import unit_area as with_unit_area
-from csm.mesh.shape import Mesh
+from csm.mesh.shape import Mesh, require_mesh
 from csm.operators.frames import FrameKind, face_frames
 from csm.operators.laplacian import (
     AnisotropicStiffness,
@@ -94,7 +94,7 @@ class Operators:
     """
 
     def __init__(self, mesh: Mesh, *, unit_area: bool = True, memo: Memo | None = None) -> None:
-        require_usable(mesh)
+        require_usable(require_mesh(mesh))
         found = body_of(mesh)
         self.mesh = with_unit_area(mesh) if unit_area else mesh
         self._debris = found.note

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from csm.errors import DataError, MeshError
+from csm.errors import ConfigError, DataError, MeshError
 from csm.mesh.io.choice import Choice
 from csm.mesh.io.files import atomic_path, read_bytes, read_bytes_of_head
 from csm.mesh.io.gltf import Fetch, parse_gltf
@@ -82,6 +82,8 @@ def read_polygons(path: str | os.PathLike[str], name: str | None = None, choose:
     MeshError
         As `read_mesh`, but for the corners of the faces.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise ConfigError(f"a mesh is read from a file given by its path, got a {type(path).__name__}")
     given = os.fspath(path)
     suffix = _format(given)
     try:
