@@ -29,9 +29,10 @@ test: lint
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(WORKERS) --doctest-modules csm tests
 
 # What takes longer than a test should: kills at random moments, a store that is harmed, disks that get full; SOAK=4 does
-# four times as much.
+# four times as much. Then the tests that `make test` leaves out for their length.
 SOAK ?= 1
 soak: install
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -m long -n $(WORKERS) tests
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 CSM_SOAK=$(SOAK) $(BIN)/python -m pytest -x tests/soak/soak_*.py
 
 # The tables of the README, from the json files under results/.

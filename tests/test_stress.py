@@ -19,7 +19,7 @@ def test_two_kills_among_three_processes_leave_what_one_alone_makes(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("harm", ["remove", "damage"])
+@pytest.mark.parametrize("harm", ["remove", pytest.param("damage", marks=pytest.mark.long)])
 def test_a_store_that_is_harmed_while_it_is_filled_ends_up_sound(tmp_path, harm):
     filling = Filling(tmp_path, 4, seed=2)
     filling.disturb(getattr(filling, harm), every=0.1)

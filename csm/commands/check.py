@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -49,6 +50,9 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     paths = [Path(path) for path in [*cfg.paths, *([cfg.folder] if cfg.folder else [])]]
     if not paths:
         raise ConfigError("check needs meshes: csm check FOLDER, or csm check a.off b.ply")
+    gone = next((path for path in paths if not os.path.lexists(path)), None)
+    if gone is not None:
+        raise DataError(f"{gone}: there is no such file or folder")
     if cfg.use not in (None, "train", "match"):
         raise ConfigError(f"use={cfg.use}: wanted train, match or null")
     if len(paths) == 1 and paths[0].is_dir() and cfg.use != "match":

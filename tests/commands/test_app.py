@@ -54,7 +54,7 @@ def visible(folder: Path) -> set[str]:
         (["match"], "match needs two meshes: csm match SOURCE TARGET"),
         (["match", "nan.off", "gone.off"], "nan.off"),
         (["describe", "gone.off", "d.npz"], "gone.off: there is no such file"),
-        (["check", "gone"], "cannot be used"),
+        (["check", "gone"], "gone: there is no such file or folder"),
         (["train", "seed=-1"], "seed=-1: wanted a whole number from 0"),
         (["train", "descriptor=adc"], "did you mean"),
         (["train", "matching=[nope]"], "matching='nope'"),
@@ -170,7 +170,11 @@ def test_two_runs_of_one_second_get_two_folders(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)], ids=["TERM", "INT"])
+@pytest.mark.parametrize(
+    ("number", "status"),
+    [(signal.SIGTERM, 143), pytest.param(signal.SIGINT, 130, marks=pytest.mark.long)],
+    ids=["TERM", "INT"],
+)
 def test_a_stopped_training_says_what_is_kept_and_goes_on_in_its_folder(tmp_path, number, status):
     write_toys(tmp_path / "toys")
     words = [sys.executable, "-m", "csm.commands.train", *TRAIN]

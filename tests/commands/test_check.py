@@ -59,7 +59,7 @@ def test_files_are_checked_as_meshes_to_match(capsys):
     assert "boundary edges: 54" in out
     assert "csm match cleans it: 1654 faces turned" in out
     assert "2 meshes, 2 can be matched" in out
-    out, error = checked(capsys, CASES / "spot_half.off", CASES / "gone.off")
+    out, error = checked(capsys, CASES / "spot_half.off", CASES / "damaged/ragged.ply")
     assert "ERROR" in out
     assert "1 of 2 meshes cannot be used" in error
 

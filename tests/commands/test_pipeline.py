@@ -273,7 +273,7 @@ def test_prepare_fills_checks_and_prunes(bench, capsys):
         ("train", [*SMALL, "data.root=toys", "descriptor.alpha=-1"], "alpha"),
         ("evaluate", [], "checkpoint=PATH"),
         ("evaluate", ["checkpoint=nothing.ckpt"], "no such checkpoint"),
-        ("match", ["source=toys/toy1.off"], "target=FILE"),
+        ("match", ["source=toys/toy1.off"], "match needs two meshes"),
         ("match", ["source=toys/nothing.off", "target=toys/toy1.off", "out=o"], "there is no such file"),
         ("describe", ["mesh=toys/toy1.off", "out=a.txt"], ".npz"),
         ("check", ["folder=nowhere"], "nowhere"),

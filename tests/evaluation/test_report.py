@@ -148,7 +148,7 @@ def _add(path: str, name: str, n: int) -> None:
         add_rows(path, [row(method=f"{name} {i}")])
 
 
-@pytest.mark.parametrize("n", [25, pytest.param(100, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("n", [25, pytest.param(100, marks=pytest.mark.long)])
 def test_processes_that_add_rows_at_once_lose_none(tmp_path: Path, n: int) -> None:
     path = str(tmp_path / "r.json")
     context = multiprocessing.get_context("fork")
