@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+import logging
 import os
 import shutil
 import sys
@@ -16,7 +17,8 @@ from typing import Any
 import hydra
 from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
-from omegaconf import DictConfig
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
 
 from csm._signals import exit_status, terminable
 from csm.commands.explain import explained
@@ -24,7 +26,7 @@ from csm.commands.groups import config_folder
 from csm.commands.help import help_text
 from csm.commands.schema import require_valid
 from csm.commands.words import to_overrides
-from csm.errors import CsmError
+from csm.errors import ConfigError, CsmError
 from csm.evaluation.provenance import remember_command
 from csm.mesh.io import atomic_path
 
@@ -136,8 +138,11 @@ def _in_own_folder(main: Callable[[], Any], config_name: str) -> Any:
     arguments = sys.argv[1:]
     sweeping = _is_sweep(arguments)
     key = "hydra.sweep.dir" if sweeping else "hydra.run.dir"
-    if any(argument.startswith(f"{key}=") or argument in _NO_WORK for argument in arguments):
+    if any(argument in _NO_WORK for argument in arguments):
         return main()
+    given = next((argument.partition("=")[2] for argument in arguments if argument.startswith(f"{key}=")), None)
+    if given is not None:
+        return _in_given_folder(main, Path(given.strip("'\"")), config_name, sweeping)
     made = new_folder(Path("outputs") / (f"{config_name}_sweep" if sweeping else config_name))
     sys.argv.insert(1 + sweeping, f"{key}={made}")
     try:
@@ -145,6 +150,45 @@ def _in_own_folder(main: Callable[[], Any], config_name: str) -> Any:
     except BaseException:
         _remove_if_bare(made)
         raise
+
+
+def _in_given_folder(main: Callable[[], Any], folder: Path, config_name: str, sweeping: bool) -> Any:
+    """Run a command in a folder of the user's choice: a new one, or that of an earlier run of the same command.
+
+    What an earlier run says of itself stays if this one is refused.
+    """
+    if not folder.is_dir() or sweeping:
+        try:
+            return main()
+        except BaseException:
+            _remove_if_bare(folder)
+            raise
+    require_own_run(folder, config_name)
+    kept = {
+        path: path.read_bytes() for path in (*folder.glob(".hydra/*.yaml"), folder / "result.json") if path.is_file()
+    }
+    try:
+        return main()
+    except CsmError:
+        for path, content in kept.items():
+            path.write_bytes(content)
+        raise
+
+
+def require_own_run(folder: Path, config_name: str) -> None:
+    """Raise a ConfigError if a folder holds files that no run of this command has left there."""
+    held = sorted(path.name for path in folder.iterdir() if path.name != ".csm.lock")
+    try:
+        settings = OmegaConf.load(folder / ".hydra" / "hydra.yaml")
+        own = str(OmegaConf.select(settings, "hydra.job.config_name")) == config_name
+    except (OSError, ValueError, OmegaConfBaseException):
+        own = False
+    if held and not own:
+        names = ", ".join(held[:3]) + (", ..." if len(held) > 3 else "")
+        raise ConfigError(
+            f"hydra.run.dir={folder}: this folder holds {names}, which no run of csm {config_name} has left there; "
+            "choose a new folder"
+        )
 
 
 def _is_sweep(arguments: Sequence[str]) -> bool:
@@ -169,12 +213,20 @@ def _remove_if_bare(folder: Path) -> None:
     bare = {".hydra", "result.json", ".csm.lock", "multirun.yaml"}
     if not folder.is_dir() or any(p.name not in bare and p.suffix != ".log" for p in folder.iterdir()):
         return
+    for handler in list(logging.getLogger().handlers):
+        if isinstance(handler, logging.FileHandler):  # its file is in the folder
+            logging.getLogger().removeHandler(handler)
+            handler.close()
     shutil.rmtree(folder, ignore_errors=True)
     for above in (folder.parent, folder.parent.parent):
         try:
             above.rmdir()
         except OSError:
             return
+
+
+def _overrides(sweeping: bool) -> dict[str, list[str]]:
+    return {"overrides": [str(text) for text in HydraConfig.get().overrides.task]} if sweeping else {}
 
 
 def _job(run: Run, cfg: DictConfig, folder: bool, failures: list[Exception]) -> Any:
@@ -187,7 +239,7 @@ def _job(run: Run, cfg: DictConfig, folder: bool, failures: list[Exception]) -> 
         text = explained(error, str(HydraConfig.get().job.config_name))
         if folder or sweeping:
             record = {"status": "failed", "error": text or str(error), "kind": type(error).__name__}
-            write_json(output_folder() / "result.json", record)
+            write_json(output_folder() / "result.json", {**record, **_overrides(sweeping)})
         if not sweeping:
             failures.append(error)
             return None
@@ -196,5 +248,5 @@ def _job(run: Run, cfg: DictConfig, folder: bool, failures: list[Exception]) -> 
         print(f"csm: {text or error}", file=sys.stderr)
         return None
     if folder or sweeping:
-        write_json(output_folder() / "result.json", {"status": "ok", **result})
+        write_json(output_folder() / "result.json", {"status": "ok", **result, **_overrides(sweeping)})
     return result.get("objective")

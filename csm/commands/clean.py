@@ -9,7 +9,7 @@ from typing import Any
 from omegaconf import DictConfig
 
 from csm.commands.app import command
-from csm.commands.outputs import digest, require_file_place, require_not_input, require_own
+from csm.commands.outputs import digest, require_file_place, require_new_in_sweep, require_not_input, require_own
 from csm.errors import ConfigError
 from csm.evaluation.provenance import provenance
 from csm.mesh.check import check
@@ -25,6 +25,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     source, target = Path(given), Path(out)
     files = places(target)
     require_file_place(target)
+    require_new_in_sweep(target)
     require_not_input([*files, account_of(target)], [source])
     require_own(files, account_of(target), cfg.overwrite)
     mesh = read_polygons(source, choose=cfg.choose)

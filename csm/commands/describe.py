@@ -12,7 +12,13 @@ from omegaconf import DictConfig
 
 from csm.commands.app import command
 from csm.commands.groups import register
-from csm.commands.outputs import require_file_place, require_not_input, require_own_archive
+from csm.commands.outputs import (
+    checksum,
+    require_file_place,
+    require_new_in_sweep,
+    require_not_input,
+    require_own_archive,
+)
 from csm.descriptors.base import Descriptor
 from csm.errors import ConfigError
 from csm.matching.subjects import subject_of
@@ -21,8 +27,8 @@ from csm.mesh.io import atomic_path
 register("descriptor")
 
 
-ARRAYS = ("values", "columns", "descriptor", "parameters")
-"""What the archive holds."""
+ARRAYS = ("values", "columns", "descriptor", "parameters", "checksum")
+"""What the archive holds; the checksum is that of the values."""
 
 
 def run(cfg: DictConfig) -> dict[str, Any]:
@@ -33,7 +39,9 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     if out.suffix != ".npz":
         raise ConfigError(f"out={out}: descriptors are written as .npz")
     require_file_place(out)
+    require_new_in_sweep(out)
     require_not_input([out], [Path(cfg.mesh)])
+    require_new_in_sweep(out)
     require_own_archive(out, ARRAYS, cfg.overwrite)
     descriptor: Descriptor = instantiate(cfg.descriptor)
     subject = subject_of(cfg.mesh, cfg.clean)
@@ -49,6 +57,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
             columns=np.array(features.columns),
             descriptor=np.array(descriptor.name),
             parameters=np.array(json.dumps(descriptor.parameters())),
+            checksum=np.array(checksum(values)),
         )
     n, columns = values.shape
     print(f"{subject.given.name}: {n} vertices, {columns} columns of {descriptor.name}: {out}")

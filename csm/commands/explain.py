@@ -88,6 +88,8 @@ def _explained(error: BaseException, config_name: str) -> str | None:
         return _not_made(error)
     if isinstance(error, HydraException | OmegaConfBaseException):
         return _of_hydra(error, config_name)
+    if isinstance(error, ValueError) and "--resolve" in str(error):
+        return "--resolve goes with --cfg: csm COMMAND --cfg job --resolve"
     if isinstance(error, ValueError) and "Config group override must be" in str(error):
         return "a group takes the name of one of its options, such as descriptor=acd; csm COMMAND --help lists them"
     if isinstance(error, ModuleNotFoundError) and (error.name or "") in _EXTRAS:
@@ -148,6 +150,9 @@ def _of_hydra(error: BaseException, config_name: str) -> str:
     gone = re.search(r"Could not delete from config. '([^']+)'", text)
     if gone:
         return f"~{gone[1]}: there is no such key to leave out; --cfg job shows the configuration"
+    if "Ambiguous value" in text:
+        several = re.search(r"argument '([^']*)'", text)
+        return f"{several[1] if several else 'a value'} is a list of values, which is for sweeps: add -m"
     parsed = re.search(r"Error parsing override '(.*)'", text) or re.search(r"at input '(.*)'", text)
     if parsed:
         return (
@@ -161,6 +166,8 @@ def _unknown_key(key: str, config_name: str) -> str:
     if key in _MOVED:
         return f"{key} is now {_MOVED[key]}"
     keys = known_keys(config_name)
+    if key in keys:
+        return f"{key} cannot be set or left out in this way; --help and --cfg job show what it may be"
     last = {name.rpartition(".")[2]: name for name in keys}
     near = nearest_names(key, keys) or nearest_names(key.rpartition(".")[2], last)
     return f"there is no option {key!r}{near}; --help lists the options, --cfg job the settings of what is chosen"

@@ -6,6 +6,7 @@ import importlib
 import sys
 
 from csm import __version__
+from csm._signals import exit_status, terminable
 from csm.commands.words import nearest_names
 
 COMMANDS = {
@@ -47,4 +48,9 @@ def main() -> None:
         print(f"csm: there is no command {arguments[0]!r}{near}; csm --help lists them", file=sys.stderr)
         sys.exit(2)
     sys.argv = [f"csm {arguments[0]}", *arguments[1:]]
-    importlib.import_module(f"csm.commands.{arguments[0]}").main()
+    try:
+        with terminable():
+            importlib.import_module(f"csm.commands.{arguments[0]}").main()
+    except KeyboardInterrupt as stop:  # while modules are loaded; later the command itself says what is kept
+        print("csm: stopped before anything was done", file=sys.stderr)
+        sys.exit(exit_status(stop))

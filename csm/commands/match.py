@@ -11,7 +11,7 @@ from omegaconf import DictConfig
 
 from csm.commands.app import command
 from csm.commands.groups import register
-from csm.commands.outputs import require_not_input, require_own, require_place
+from csm.commands.outputs import require_new_in_sweep, require_not_input, require_own, require_place
 from csm.data.store import Store
 from csm.errors import ConfigError
 from csm.matching import DescriptorMethod, Method, match_meshes
@@ -42,6 +42,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
 
 def _require_place(folder: Path, inputs: list[Path], overwrite: bool) -> None:
     require_place(folder)
+    require_new_in_sweep(folder)
     outputs = [folder / name for name in (*FILES, ACCOUNT)]
     require_not_input(outputs, inputs)
     require_own(outputs[:-1], outputs[-1], overwrite)

@@ -10,6 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from hydra.core.hydra_config import HydraConfig
+from hydra.types import RunMode
+from numpy.typing import NDArray
 
 from csm.errors import ConfigError
 from csm.evaluation.report import read_rows
@@ -115,14 +118,16 @@ def require_own(outputs: Iterable[Path], account: Path, overwrite: bool) -> None
         return
     files = _files_of(account)
     for path in outputs:
-        if os.path.lexists(path) and (path.is_dir() or files.get(path.name) != digest(path)):
+        if os.path.lexists(path) and (not path.is_file() or files.get(path.name) != digest(path)):
             why = "has been changed since csm wrote it" if path.name in files else "was not written by csm here"
             raise ConfigError(f"{path}: there is such a file, which {why}; {_OVERWRITE}")
-    if account.exists() and not files:
+    if os.path.lexists(account) and not files:
         raise ConfigError(f"{account}: there is such a file, which was not written by csm here; {_OVERWRITE}")
 
 
 def _files_of(account: Path) -> Mapping[str, str]:
+    if not account.is_file():
+        return {}
     try:
         files = json.loads(account.read_text(encoding="utf-8")).get("files")
     except (OSError, ValueError, AttributeError):
@@ -141,9 +146,29 @@ def require_own_archive(path: Path, arrays: Iterable[str], overwrite: bool) -> N
     if overwrite or not os.path.lexists(path):
         return
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            own = set(archive.files) == set(arrays)
+        own = path.is_file() and _is_own_archive(path, arrays)
     except Exception:
         own = False
     if not own:
-        raise ConfigError(f"{path}: there is such a file, which was not written by csm describe; {_OVERWRITE}")
+        raise ConfigError(
+            f"{path}: there is such a file, which was not written by csm describe, or changed since; {_OVERWRITE}"
+        )
+
+
+def _is_own_archive(path: Path, arrays: Iterable[str]) -> bool:
+    with np.load(path, allow_pickle=False) as archive:
+        return set(archive.files) == set(arrays) and str(archive["checksum"]) == checksum(archive["values"])
+
+
+def checksum(values: NDArray[Any]) -> str:
+    """Return the SHA-256 (hex) of an array."""
+    return hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()
+
+
+def require_new_in_sweep(out: Path) -> None:
+    """Raise if a job of a sweep would write where another one has: an output that all jobs have in common."""
+    if HydraConfig.initialized() and HydraConfig.get().mode == RunMode.MULTIRUN and os.path.lexists(out):
+        raise ConfigError(
+            f"out={out}: is there already, and the jobs of a sweep would replace each other's results; give each its "
+            "own: out='NAME_${hydra:job.num}'"
+        )

@@ -20,9 +20,9 @@ register("data", "descriptor", "model")
 def run(cfg: DictConfig) -> dict[str, Any]:
     """Fill, check or prune the store, and return counts."""
     if cfg.action == "check":
-        return check_store(Store(cfg.store))
+        return check_store(_existing_store(cfg.store))
     if cfg.action == "prune":
-        return prune_store(Store(cfg.store), _days(cfg.unused_days))
+        return prune_store(_existing_store(cfg.store), _days(cfg.unused_days))
     if cfg.action != "fill":
         raise ConfigError(f"action={cfg.action}: wanted fill, check or prune")
     data = make_data(cfg)
@@ -32,6 +32,13 @@ def run(cfg: DictConfig) -> dict[str, Any]:
             f"{len(summary.failures)} shapes cannot be prepared; the others are in the store.\n{summary.table()}"
         )
     return {"present": summary.present, "made": summary.made, "seconds": summary.seconds}
+
+
+def _existing_store(root: str | None) -> Store:
+    store = Store(root)
+    if root is not None and not store.root.is_dir():
+        raise DataError(f"store={root}: there is no such folder")
+    return store
 
 
 def all_jobs(data: DataModule) -> list[Job]:

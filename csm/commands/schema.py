@@ -7,6 +7,7 @@ its names and types.  Only ranges that annotations cannot say are in the table h
 from __future__ import annotations
 
 import inspect
+import logging
 import math
 import types
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -16,7 +17,7 @@ from hydra.utils import get_object
 from omegaconf import DictConfig, OmegaConf
 
 from csm.commands.groups import FILLED_IN
-from csm.commands.words import nearest_names
+from csm.commands.words import PATHS, nearest_names
 from csm.errors import ConfigError
 
 
@@ -85,6 +86,7 @@ def require_valid(cfg: DictConfig) -> None:
     """
     plain: Any = OmegaConf.to_container(cfg, resolve=True)
     require_in_ranges(plain)
+    _require_texts(plain)
     for group, node in plain.items():
         if isinstance(node, Mapping):
             _require_node(group, node)
@@ -112,6 +114,18 @@ def require_in_ranges(plain: Mapping[str, Any]) -> None:
             raise ConfigError(f"{key}={_shown(plain[key])}: wanted true or false")
 
 
+def _require_texts(plain: Mapping[str, Any]) -> None:
+    for key in ("name", "table"):
+        if key in plain and plain[key] is not None and not (isinstance(plain[key], str) and plain[key]):
+            raise ConfigError(f"{key}={_shown(plain[key])}: wanted a text")
+    if "table" in plain and plain["table"] is None:
+        raise ConfigError("table=null: wanted a text")
+    for key in PATHS - {"data.test_roots", "paths"}:
+        there, value = _lookup(plain, key)
+        if there and value is not None and not isinstance(value, str):
+            raise ConfigError(f"{key}={_shown(value)}: wanted a path")
+
+
 def _lookup(plain: Mapping[str, Any], key: str) -> tuple[bool, Any]:
     node: Any = plain
     for part in key.split("."):
@@ -125,6 +139,7 @@ def _require_node(group: str, node: Mapping[str, Any]) -> None:
     """Check a node that makes an object, and those below it."""
     target = node.get("_target_")
     if isinstance(target, str):
+        logging.getLogger("hydra._internal.utils").disabled = True  # the error says all that it logs
         try:
             cls = get_object(target)
         except Exception as error:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from hydra.experimental.callback import Callback
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import DictConfig
 
 from csm.mesh.io import atomic_path
 
@@ -38,9 +38,9 @@ def _job_number(path: Path) -> tuple[int, str]:
 
 
 def _row(path: Path) -> dict[str, Any]:
-    overrides = OmegaConf.load(path.parent / ".hydra" / "overrides.yaml")
-    given = dict(str(item).lstrip("+~").split("=", 1) for item in overrides if "=" in str(item))
-    return {"job": path.parent.name, **given, **json.loads(path.read_text())}
+    record = json.loads(path.read_text())
+    given = dict(item.lstrip("+~").split("=", 1) for item in record.pop("overrides", ()) if "=" in item)
+    return {"job": path.parent.name, **given, **record}
 
 
 def write_csv(path: Path, rows: list[dict[str, Any]]) -> None:

@@ -43,7 +43,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
         return found
     method = NetworkMethod(trained.module)
     tested = measure_all(method, training.data, protocol, matching=matching, table=cfg.table, device=cfg.device)
-    conclude(cfg, tested, f"{cfg.name}: {method.training.get('protocol')}.")
+    conclude(cfg, tested, f"{training.name}: {method.training.get('protocol')}.")
     if training.logger is not None:
         print(f"log:          {folder}  (tensorboard --logdir {folder})")
     return found | numbers(tested)
@@ -54,16 +54,22 @@ def make_training(cfg: DictConfig) -> Training:
     logger, callbacks = cfg.get("logger"), cfg.get("callbacks") or {}
     settings = plain(cfg)
     return Training(
-        name=str(cfg.name),
+        name=str(cfg.name or plain(cfg.model)["name"]),
         data=make_data(cfg),
         network=plain(cfg.model),
         options={**plain(cfg.optimizer), **plain(cfg.learning)},
         trainer=instantiate(cfg.trainer, _partial_=True),
         seed=int(cfg.seed),
-        callbacks=[instantiate(callback) for callback in callbacks.values() if callback],
+        callbacks=[_callback(name, callback) for name, callback in callbacks.items() if callback],
         logger=instantiate(logger, _partial_=True) if logger else None,
         settings={name: settings[name] for name in GROUPS},
     )
+
+
+def _callback(name: object, node: Any) -> Any:
+    if not isinstance(node, DictConfig):
+        raise ConfigError(f"callbacks.{name}={node}: wanted a class and its options, {{_target_: PLACE, ...}}")
+    return instantiate(node)
 
 
 def require_network_of_recipe(cfg: DictConfig, overrides: Sequence[str]) -> None:

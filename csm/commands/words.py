@@ -85,7 +85,7 @@ def _is_option(argument: str, before: str) -> bool:
     """Tell whether an argument is a flag of Hydra, or the value of the flag before it."""
     if argument.startswith("-") and not Path(argument).exists():
         return True
-    return before.startswith("-") and before not in _ALONE and "=" not in before
+    return before.startswith("-") and before not in _ALONE and "=" not in before and not Path(before).exists()
 
 
 def _is_word(argument: str) -> bool:
@@ -103,13 +103,13 @@ def _named(command: str, words: Sequence[str]) -> list[str]:
     if not words:
         return []
     if keys and keys[0] in LISTS:
-        each = words if keys[0] not in PATHS else [quoted(os.path.expanduser(word)) for word in words]
+        each = words if keys[0] not in PATHS else [_path(word) for word in words]
         return [f"{keys[0]}=[{','.join(each)}]"]
     if len(words) > len(keys):
         extra = words[len(keys)]
         takes = f"takes {' '.join(key.upper() for key in keys)} and " if keys else "takes "
         raise ConfigError(f"csm {command} {takes}options of the form key=value, got {extra!r}{_meant(extra)}")
-    return [f"{key}={quoted(os.path.expanduser(word))}" for key, word in zip(keys, words, strict=False)]
+    return [f"{key}={_path(word)}" for key, word in zip(keys, words, strict=False)]
 
 
 def _meant(word: str) -> str:
@@ -131,16 +131,22 @@ def _override(argument: str, sweeping: bool) -> str:
 
 
 def _path_value(value: str, sweeping: bool) -> str:
-    if _is_quoted(value) or value.startswith("${"):
+    if _is_quoted(value) or (value.startswith("${") and not os.path.lexists(value)):
         return value
     whole = os.path.expanduser(value)
     if os.path.lexists(whole):
-        return quoted(whole)
+        return _path(value)
     if value.startswith("[") and value.endswith("]"):
         return f"[{','.join(_each(value[1:-1]))}]"
     if sweeping and "," in value:
         return ",".join(_each(value))
     return quoted(whole)
+
+
+def _path(word: str) -> str:
+    """Return a path in quotes; where a file has "${" in its name, that is no reference."""
+    whole = os.path.expanduser(word)
+    return quoted(whole).replace("${", r"\${") if os.path.lexists(whole) else quoted(whole)
 
 
 def _each(values: str) -> Iterable[str]:

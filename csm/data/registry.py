@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from csm._places import load
-from csm.errors import DataError
+from csm.errors import ConfigError, DataError
 from csm.mesh.io import list_folders
 
 if TYPE_CHECKING:
@@ -58,7 +58,11 @@ def recognise(folder: str | Path) -> FolderSet:
     DataError
         If there are no meshes; the message names sub-folders that would be recognised, or the known layouts.
     """
+    if not isinstance(folder, str | os.PathLike):
+        raise ConfigError(f"a set is recognised in a folder given by its path, got a {type(folder).__name__}")
     root = Path(folder)
+    if not root.is_dir():
+        raise DataError(f"{root}: there is no such folder")
     found = _first(root, layouts())
     if found:
         return found

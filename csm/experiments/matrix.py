@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -22,14 +23,19 @@ from csm.data.store import Store
 from csm.errors import ConfigError, CsmError, DataError
 from csm.evaluation.protocol import EvaluationProtocol
 from csm.evaluation.report import ResultRow, average_seeds, read_rows, write_curves_csv, write_rows
+from csm.experiments.resuming import last_checkpoint, require_same_settings
 from csm.experiments.testing import measure_set
-from csm.experiments.training import Training, fit
+from csm.experiments.training import Training, fit, sketch
+from csm.learning.checkpoint import read_checkpoint
 from csm.matching.base import require_device
 from csm.matching.network import NetworkMethod, load_model
 from csm.matching.registry import matchers
 from csm.mesh.io import atomic_path, read_bytes
 
 _log = logging.getLogger(__name__)
+
+ROW = "row.json"
+"""How the row in a folder is trained."""
 
 _MOVED = {f"optimizer.{name}": f"learning.{name}" for name in ("loss_products", "loss_rows", "rotate")}
 """Options that stand in another group in the ``row.json`` of earlier versions."""
@@ -132,11 +138,22 @@ class Matrix:
 
     def _fill_row(self, row: Row) -> list[ResultRow]:
         """Return the rows of every test set, one matcher after the other."""
-        require_same_training(self._place(row), row.identity)
+        known = require_same_training(self._place(row), row.identity)
         training = row.make()
+        if not known:
+            self._require_same_network(row, training)
+            keep_training(self._place(row), row.identity)
         tests = training.data.test_sets
         found = {(test, rule): cell for test in tests for rule, cell in self._cells(row, training, test).items()}
         return [found[test, rule] for rule in self.matching for test in tests]
+
+    def _require_same_network(self, row: Row, training: Training) -> None:
+        """Refuse a network of other settings in a folder that does not tell any more how it was trained."""
+        for path in (self._checkpoint(row), last_checkpoint(self._place(row))):
+            if path.exists():
+                with suppress(DataError):  # a damaged one is made again
+                    read_checkpoint(path)
+                    require_same_settings(path, sketch(training, None))
 
     def _cells(self, row: Row, training: Training, test: str) -> dict[str, ResultRow]:
         """Return the rows of one test set, from files that answer the same question or measured together."""
@@ -190,8 +207,14 @@ class Matrix:
         return None
 
 
-def require_same_training(folder: Path, identity: Mapping[str, Any]) -> None:
-    """Keep in a folder how a row is trained, or refuse the folder if it was trained otherwise.
+def keep_training(folder: Path, identity: Mapping[str, Any]) -> None:
+    """Keep in a folder how a row is trained."""
+    with atomic_path(folder / ROW) as temporary:
+        temporary.write_text(json.dumps(_comparable(identity), indent=1) + "\n", encoding="utf-8")
+
+
+def require_same_training(folder: Path, identity: Mapping[str, Any]) -> bool:
+    """Refuse a folder in which a row was trained otherwise, and return whether the folder tells how.
 
     An option that is off and that the folder does not know of came with a later version and changes nothing.
 
@@ -200,18 +223,17 @@ def require_same_training(folder: Path, identity: Mapping[str, Any]) -> None:
     ConfigError
         With the entries that differ.
     """
-    path, wanted = folder / "row.json", _comparable(identity)
+    path, wanted = folder / ROW, _comparable(identity)
     if not path.exists():
-        with atomic_path(path) as temporary:
-            temporary.write_text(json.dumps(wanted, indent=1) + "\n", encoding="utf-8")
-        return
+        return False
     try:
-        kept = _comparable(json.loads(read_bytes(path)))
+        content = json.loads(read_bytes(path))
+        if not content:
+            raise ValueError("there is nothing in it")
+        kept = _comparable(content)
     except (ValueError, TypeError, AttributeError, RecursionError) as error:
         _log.warning("%s: is damaged (%s); it is written again, from the settings that are wanted", path, error)
-        path.unlink()
-        require_same_training(folder, identity)
-        return
+        return False
     changed = [
         f"{key}: {kept.get(key)} there, {wanted.get(key)} wanted"
         for key in sorted({*kept, *wanted})
@@ -222,6 +244,7 @@ def require_same_training(folder: Path, identity: Mapping[str, Any]) -> None:
             f"{folder} was trained otherwise ({'; '.join(changed)}); give the row another name, choose another "
             "folder=, or remove that one"
         )
+    return True
 
 
 def _comparable(identity: Mapping[str, Any]) -> dict[str, Any]:

@@ -101,7 +101,7 @@ def resume_point(folder: Path, resume: Path | str | None) -> Path | None:
     return last
 
 
-def require_same_settings(path: Path, module: CSMModule, epochs: int | None) -> None:
+def require_same_settings(path: Path, module: CSMModule, epochs: int | None = None) -> None:
     """Raise if a checkpoint was trained with other settings than those of a module that is to go on from it.
 
     Parameters
@@ -112,6 +112,7 @@ def require_same_settings(path: Path, module: CSMModule, epochs: int | None) -> 
         The module that would go on.
     epochs
         How many epochs it is to be trained for; other numbers are refused where the schedule is laid out over them.
+        None to leave that out.
 
     Raises
     ------
@@ -121,12 +122,13 @@ def require_same_settings(path: Path, module: CSMModule, epochs: int | None) -> 
     kept, wanted = (_flat(read) for read in (read_checkpoint(path)["hyper_parameters"], module.hparams))
     differing = sorted(key for key in kept.keys() | wanted.keys() if kept.get(key) != wanted.get(key))
     changed = [key for key in differing if key not in _FREE]
-    if module.schedule in _FIXED_LENGTH and kept.get("training.epochs") not in (None, epochs):
+    if epochs is not None and module.schedule in _FIXED_LENGTH and kept.get("training.epochs") not in (None, epochs):
         changed.append("training.epochs")
     if changed:
         told = "; ".join(f"{key}: {kept.get(key)} there, {wanted.get(key)} wanted" for key in changed)
         raise ConfigError(
-            f"{path}: was trained with other settings ({told}); go on with those, or choose resume=null to begin anew"
+            f"{path}: was trained with other settings ({told}); go on with those, or begin anew (resume=null, or another "
+            "folder)"
         )
 
 

@@ -17,6 +17,7 @@ from typing import Any
 
 import lightning as L
 import torch
+from lightning.fabric.utilities.exceptions import MisconfigurationException
 from lightning.pytorch.callbacks import ModelCheckpoint
 from lightning.pytorch.loggers import Logger
 
@@ -124,10 +125,9 @@ def _fit(training: Training, folder: Path, resume: Path | str | None) -> Trained
     L.seed_everything(training.seed, workers=True, verbose=False)
     begin = resume_point(folder, resume)
     trainer = _make_trainer(training, folder)
-    with torch.device("meta"):  # what does not fit fails before the preparation
-        sketch = make_module(training, 1, trainer.max_epochs)
+    draft = sketch(training, trainer.max_epochs)
     if begin:
-        require_same_settings(begin, sketch, trainer.max_epochs)
+        require_same_settings(begin, draft, trainer.max_epochs)
     loaded = LightningData(training.data)
     loaded.prepare_data()
     module = make_module(training, loaded.n_features, trainer.max_epochs)
@@ -141,6 +141,16 @@ def _fit(training: Training, folder: Path, resume: Path | str | None) -> Trained
     export_module(module, folder / "export")
     measured = {key: float(value) for key, value in trainer.callback_metrics.items()}
     return Trained(module, checkpoint, seconds, measured)
+
+
+def sketch(training: Training, epochs: int | None) -> CSMModule:
+    """Make the module without memory for its weights: what does not fit fails here, before the preparation."""
+    try:
+        with torch.device("meta"):
+            return make_module(training, 1, epochs)
+    except (IndexError, RuntimeError, TypeError, ZeroDivisionError) as error:
+        options = ", ".join(f"{key}={value}" for key, value in training.network.items())
+        raise ConfigError(f"model: no network can be made with {options} ({error})") from error
 
 
 def _what_is_kept(folder: Path, trainer: L.Trainer) -> str:
@@ -197,19 +207,26 @@ def _make_trainer(training: Training, folder: Path) -> L.Trainer:
     for callback in training.callbacks:
         if isinstance(callback, TensorBoardPanels) and not callback.hparams:
             callback.hparams = training.settings
-    trainer = training.trainer(
-        callbacks=[*training.callbacks, RandomStates(), FiniteLoss(), keep],
-        plugins=[WholeCheckpoints()],
-        logger=_make_logger(training, folder),
-        default_root_dir=folder,
-        **({} if sys.stdout.isatty() else {"enable_progress_bar": False}),
-    )
+    try:
+        trainer = _trainer(training, folder, keep)
+    except (ValueError, TypeError, MisconfigurationException) as error:
+        raise ConfigError(f"trainer: {' '.join(str(error).split())}") from error
     if trainer.num_devices != 1 or trainer.num_nodes != 1:
         raise ConfigError(
             f"trainer.devices={trainer.num_devices}: csm trains on one device, as a batch is one shape; set "
             "trainer.devices=1"
         )
     return trainer
+
+
+def _trainer(training: Training, folder: Path, keep: ModelCheckpoint) -> L.Trainer:
+    return training.trainer(
+        callbacks=[*training.callbacks, RandomStates(), FiniteLoss(), keep],
+        plugins=[WholeCheckpoints()],
+        logger=_make_logger(training, folder),
+        default_root_dir=folder,
+        **({} if sys.stdout.isatty() else {"enable_progress_bar": False}),
+    )
 
 
 def _make_logger(training: Training, folder: Path) -> Logger | bool:
@@ -229,4 +246,5 @@ def _quiet_lightning() -> None:
     logging.getLogger("lightning.fabric").setLevel(logging.WARNING)
     warnings.filterwarnings("ignore", message=r".*LeafSpec.*is deprecated")
     warnings.filterwarnings("ignore", message=r".*does not have many workers.*")
+    warnings.filterwarnings("ignore", message=r"The dirpath has changed")
     warnings.filterwarnings("ignore", message=r"Checkpoint directory .* exists and is not empty")

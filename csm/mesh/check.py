@@ -71,7 +71,8 @@ def check(mesh: Mesh) -> tuple[Finding, ...]:
     finite = bool(np.isfinite(mesh.vertices[topology.referenced]).all())
     tests: list[Callable[[_Topology], Iterator[Finding]]] = [_faces, _references, _edges, _fans, _components]
     tests = [*tests, _degenerate, _duplicates, _scale] if finite else [_non_finite, *tests]
-    findings = [finding for test in tests for finding in test(topology)]
+    with np.errstate(over="ignore", invalid="ignore"):  # of coordinates that findings are about
+        findings = [finding for test in tests for finding in test(topology)]
     return tuple(sorted(findings, key=lambda f: f.severity != "error"))
 
 
@@ -143,7 +144,7 @@ def _non_finite(t: _Topology) -> Iterator[Finding]:
 
 def _faces(t: _Topology) -> Iterator[Finding]:
     if t.mesh.n_faces == 0:
-        yield Finding("no_faces", 0, (), "error", "no faces: a point cloud")
+        yield Finding("no_faces", 0, (), "error", "no faces: a point cloud or curves, of which no surface is made")
 
 
 def _references(t: _Topology) -> Iterator[Finding]:
@@ -257,6 +258,11 @@ def _components(t: _Topology) -> Iterator[Finding]:
 
 def _scale(t: _Topology) -> Iterator[Finding]:
     size = float(np.sqrt(t.mesh.area))
+    if not np.isfinite(size):
+        far = np.abs(t.mesh.vertices).max(axis=1)
+        where = np.flatnonzero(t.referenced & (far > 1e100))
+        yield _found("overflow", "error", "vertices so far away that areas are beyond all numbers", where)
+        return
     if size > 0 and not SIZES[0] <= size <= SIZES[1]:
         word = "tiny" if size < SIZES[0] else "huge"
         yield Finding(f"{word}_scale", 1, (), "note", f"{word} scale: the square root of the area is {size:.3g}")

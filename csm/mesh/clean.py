@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from csm._types import BoolArray, FloatArray, IntArray
-from csm.errors import ConfigError
+from csm.errors import ConfigError, MeshError
 from csm.mesh.check import FLAT
 from csm.mesh.debris import DEBRIS, body_of
 from csm.mesh.mending import collapsed, sound_faces, split, turns, welded
@@ -100,6 +100,8 @@ def clean(
 
     Raises
     ------
+    MeshError
+        If there are no faces, or coordinates are not finite.
     ConfigError
         If `debris` or `tolerance` is not from 0 to below 1.
 
@@ -115,7 +117,8 @@ def clean(
     for name, value in (("debris", debris), ("tolerance", tolerance)):
         if not 0 <= value < 1:
             raise ConfigError(f"{name}={value}; wanted a fraction from 0 to below 1")
-    work = _Work.of(mesh if isinstance(mesh, PolygonMesh) else require_mesh(mesh))
+    require_finite(mesh if isinstance(mesh, PolygonMesh) else require_mesh(mesh))
+    work = _Work.of(mesh)
     unsound = work.drop_unsound_faces()  # a face that is there twice has no boundary to be welded
     if weld:
         work.weld(tolerance)
@@ -130,6 +133,20 @@ def clean(
     if orient:
         work.orient()
     return work.done(mesh)
+
+
+def require_finite(mesh: Mesh | PolygonMesh) -> None:
+    """Raise a MeshError if a face has a corner that is not finite, or so far away that areas overflow."""
+    corners = np.unique(mesh.faces if isinstance(mesh, Mesh) else mesh.corners)
+    far = np.abs(mesh.vertices[corners]).max(axis=1)
+    bad = corners[~(far < 1e100)]
+    if bad.size:
+        raise MeshError(
+            f"{mesh.label}: {bad.size} vertices with coordinates that are not finite, or beyond 1e100; the first is "
+            f"vertex {bad[0]}: {', '.join(f'{x:g}' for x in mesh.vertices[bad[0]])}"
+        )
+    if corners.size == 0:
+        raise MeshError(f"{mesh.label}: there are no faces; csm works on surfaces, so reconstruct one first")
 
 
 @dataclass
@@ -214,8 +231,10 @@ class _Work:
         body = body_of(Mesh(self.vertices, self.faces), fraction)
         if body.n_debris:
             self._keep_faces(body.faces)
+            much = "; WARNING: that is most of it" if body.area_left_out > 0.5 else ""
             text = (
-                f"pieces of debris left out: each below {fraction:.2g} of the area, together {body.area_left_out:.2%}"
+                f"pieces of debris left out: each below {fraction:.2g} of the area, together "
+                f"{body.area_left_out:.2%}{much}"
             )
             self._did("debris", body.n_debris, text)
 

@@ -181,6 +181,7 @@ class Operators:
             else:
                 arrays = self._memo.fetch(kind, self.mesh, params, lambda: _to_arrays(make()))
                 self._spectra[key] = _from_arrays(arrays)
+            self._spectra[key] = replace(self._spectra[key], name=self.mesh.label)
         return self._spectra[key]
 
     def _larger(self, kind: str, params: dict[str, Any]) -> Spectrum | None:

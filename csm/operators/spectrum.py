@@ -37,6 +37,8 @@ class Spectrum:
         1/area if that is greater).
     notes
         What happened that a careful reader would want to know, such as a second attempt.
+    name
+        What messages call the mesh.
     """
 
     evals: FloatArray
@@ -44,6 +46,7 @@ class Spectrum:
     mass: FloatArray
     residual: float
     notes: tuple[str, ...] = ()
+    name: str = ""
 
     def first(self, k: int) -> Spectrum:
         """Return the `k` smallest pairs of these; ConfigError if there are fewer."""
@@ -62,7 +65,8 @@ class Spectrum:
         count = int(np.searchsorted(self.evals, _ZERO / self.mass.sum()))
         if count == len(self.evals):
             raise NumericalError(
-                f"all {count} eigenvalues are zero, one per component of the mesh; ask for more of them"
+                f"{self.name or 'the mesh'}: all {count} eigenvalues are zero, one per component; ask for more of "
+                "them, join the components, or keep the largest alone (csm clean IN OUT debris=0.9)"
             )
         return count
 
@@ -121,7 +125,9 @@ def _require_solvable(stiffness: sparse.csr_array, mass: FloatArray, k: int, nam
     if stiffness.shape != (n, n):
         raise ConfigError(f"{name}: the stiffness has shape {stiffness.shape}, but there are {n} masses")
     if not 1 <= k <= n:
-        raise ConfigError(f"{name}: asked for {k} eigenpairs, but {n} vertices have {n}; ask for 1 to {n}")
+        raise ConfigError(
+            f"{name}: asked for {k} eigenpairs, but {n} vertices have {n}; ask for 1 to {n}, or take a finer mesh"
+        )
     if not (np.isfinite(stiffness.data).all() and np.isfinite(mass).all()):
         raise MeshError(f"{name}: the Laplacian has entries that are not finite; run `csm check` on the mesh")
     without = np.flatnonzero(mass <= 0)

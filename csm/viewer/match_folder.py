@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
+import tempfile
 from pathlib import Path
 from typing import Any
 
 from csm.evaluation.provenance import provenance
 from csm.matching.match import Match
-from csm.mesh.io import atomic_path, write_map, write_mesh
+from csm.mesh.io import atomic_path, copy_file, write_map, write_mesh
 from csm.mesh.shape import Mesh
 from csm.viewer.colors import position_colors, pull_colors
 from csm.viewer.html import Panel, Viewer, viewer_html, write_html
@@ -18,7 +19,7 @@ FILES = ("map.txt", "map.npz", "confidence.txt", "source.ply", "target.ply", "ma
 """What `write_match` writes, besides its account."""
 
 ACCOUNT = "match.json"
-"""How the match was made; it is written last and has the hashes of the other files."""
+"""How the match was made; it has the hashes of the other files."""
 
 
 def write_match(match: Match, folder: Path, method: str, seconds: float) -> None:
@@ -37,6 +38,22 @@ def write_match(match: Match, folder: Path, method: str, seconds: float) -> None
     seconds
         How long it took.
     """
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".csm-", dir=folder) as staged:
+        account = _write_files(match, Path(staged), method)
+        account = {**account, "seconds": round(seconds, 2), "files": {n: _digest(Path(staged) / n) for n in FILES}}
+        with atomic_path(folder / ACCOUNT) as temporary:  # first: what of the others comes after it is known as csm's
+            temporary.write_text(json.dumps(account, indent=1) + "\n", encoding="utf-8")
+        for name in FILES:
+            copy_file(Path(staged) / name, folder / name)
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _write_files(match: Match, folder: Path, method: str) -> dict[str, Any]:
+    """Write all files but the account, which is returned."""
     source, target, indices = match.source, match.target, match.indices
     meaning = f"line i = vertex of {target.name} that vertex i of {source.name} is mapped to"
     for name in ("map.txt", "map.npz"):
@@ -49,10 +66,7 @@ def write_match(match: Match, folder: Path, method: str, seconds: float) -> None
     viewer = Viewer([Panel(source, colors, to_reference=indices), Panel(target, reference)], reference=1)
     page = viewer_html(f"{source.name} → {target.name}", viewer, text=_caption(match, method))
     write_html(folder / "match.html", page)
-    account = _account(match, meaning, method, seconds)
-    account["files"] = {name: hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in FILES}
-    with atomic_path(folder / ACCOUNT) as temporary:
-        temporary.write_text(json.dumps(account, indent=1) + "\n", encoding="utf-8")
+    return _account(match, meaning, method)
 
 
 def _write_confidence(path: Path, match: Match) -> None:
@@ -75,7 +89,7 @@ def _what_is_shown(match: Match, method: str) -> str:
     )
 
 
-def _account(match: Match, meaning: str, method: str, seconds: float) -> dict[str, Any]:
+def _account(match: Match, meaning: str, method: str) -> dict[str, Any]:
     made = provenance()
     return {
         "source": _of_mesh(match.source),
@@ -86,7 +100,6 @@ def _account(match: Match, meaning: str, method: str, seconds: float) -> dict[st
         "returned": match.confidence.returned,
         "verdict": match.confidence.verdict,
         "notes": list(match.notes),
-        "seconds": round(seconds, 2),
         "command": made.command,
         "commit": made.commit,
         "versions": made.versions,

@@ -200,3 +200,51 @@ def test_a_stopped_training_says_what_is_kept_and_goes_on_in_its_folder(tmp_path
     assert start("cut", "callbacks=none").wait() == 0
     whole, cut = (torch.load(tmp_path / f / "model.ckpt", weights_only=True)["state_dict"] for f in ("whole", "cut"))
     assert all(torch.equal(whole[name], cut[name]) for name in whole)
+
+
+def test_what_a_user_has_in_a_run_folder_stays(csm, tmp_path):
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    (mine / "result.json").write_text("mine")
+    status, _, error = csm("train", "experiment=demo", "hydra.run.dir=mine")
+    assert status == 2
+    assert "mine: this folder holds result.json, which no run of csm train has left there" in error
+    assert (mine / "result.json").read_text() == "mine"
+    assert [path.name for path in mine.iterdir()] == ["result.json"]
+
+
+def test_a_refused_run_leaves_what_a_finished_one_says_of_itself(csm, tmp_path):
+    write_toys(tmp_path / "toys")
+    short = [*TRAIN, "trainer.max_epochs=1", "callbacks=none", "hydra.run.dir=run"]
+    assert csm("train", *short)[0] == 0
+    said = {p: p.read_bytes() for p in (tmp_path / "run").rglob("*") if p.is_file() and p.suffix in (".json", ".yaml")}
+    assert len(said) > 3
+    for words in (["train", *short, "seed=-1"], ["train", *short, "model.dropout=0.3"], ["evaluate", *short[-1:]]):
+        assert csm(*words)[0] == 2
+    assert {path: path.read_bytes() for path in said} == said
+
+
+def test_jobs_of_a_sweep_do_not_replace_each_others_match(csm, tmp_path):
+    write_mesh(tmp_path / "a.off", blob(2))
+    words = ["match", "-m", "a.off", "a.off", "descriptor=gps,constant"]
+    status, _, error = csm(*words, "out=r", "hydra.sweep.dir=s")
+    assert status == 2
+    assert "out='NAME_${hydra:job.num}'" in error
+    assert csm(*words, "out='r_${hydra:job.num}'", "hydra.sweep.dir=t")[0] == 0
+    assert {"r_0", "r_1"} <= visible(tmp_path)
+    assert len((tmp_path / "t/sweep.csv").read_text().splitlines()) == 3
+
+
+def test_a_match_that_fails_while_it_writes_leaves_nothing_and_can_be_repeated(csm, tmp_path, monkeypatch):
+    write_mesh(tmp_path / "a.off", blob(2))
+    words = ["match", "a.off", "a.off", "descriptor=gps", "out=r"]
+    with monkeypatch.context() as broken:
+        broken.setattr(
+            "csm.viewer.match_folder.write_html", lambda *a: (_ for _ in ()).throw(OSError(28, "full", "r/x"))
+        )
+        status, _, error = csm(*words)
+    assert status == 2
+    assert "the disk is full" in error
+    assert list((tmp_path / "r").iterdir()) == []
+    assert csm(*words)[0] == 0
+    assert "match.json" in visible(tmp_path / "r")

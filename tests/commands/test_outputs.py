@@ -1,11 +1,13 @@
 from __future__ import annotations
 
 import json
+import os
 
 import numpy as np
 import pytest
 
 from csm.commands.outputs import (
+    checksum,
     digest,
     require_file_place,
     require_not_input,
@@ -53,9 +55,20 @@ def test_a_json_of_somebody_else_is_not_replaced(tmp_path, content):
 
 def test_an_archive_is_known_by_its_arrays(tmp_path):
     path = tmp_path / "d.npz"
-    require_own_archive(path, ["values"], False)
-    np.savez(path, values=np.zeros(2))
-    require_own_archive(path, ["values"], False)
+    arrays = ["values", "checksum"]
+    require_own_archive(path, arrays, False)
+    np.savez(path, values=np.zeros(2), checksum=np.array(checksum(np.zeros(2))))
+    require_own_archive(path, arrays, False)
+    np.savez(path, values=np.ones(2), checksum=np.array(checksum(np.zeros(2))))
+    with pytest.raises(ConfigError, match="or changed since"):
+        require_own_archive(path, arrays, False)
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(ConfigError, match=r"d\.npz"):
+        require_own_archive(path, arrays, False)
+    with pytest.raises(ConfigError, match=r"d\.npz"):
+        require_own([path], tmp_path / "match.json", False)
+    path.unlink()
     np.savez(path, vertices=np.zeros(2), faces=np.zeros(2))
     with pytest.raises(ConfigError, match=r"d\.npz"):
         require_own_archive(path, ["values"], False)

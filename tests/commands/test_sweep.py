@@ -10,9 +10,8 @@ from csm.commands.sweep import SweepTable, write_csv
 
 
 def job(folder, number: int, overrides: list[str], result: dict) -> None:
-    (folder / str(number) / ".hydra").mkdir(parents=True)
-    OmegaConf.save(OmegaConf.create(overrides), folder / str(number) / ".hydra" / "overrides.yaml")
-    (folder / str(number) / "result.json").write_text(json.dumps(result))
+    (folder / str(number)).mkdir(parents=True)
+    (folder / str(number) / "result.json").write_text(json.dumps({**result, "overrides": overrides}))
 
 
 def end_of_sweep(folder) -> None:

@@ -4,11 +4,25 @@ import pytest
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hypothesis import given
 from hypothesis import strategies as st
+from omegaconf import OmegaConf
 
 from csm.commands.words import nearest_names, quoted, to_overrides
 from csm.errors import ConfigError
 
-NAMES = ["a b (1).off", "it's.ply", "x=y.obj", "[1].off", "é~#,{}.off", "2024", "null", 'a"b.off', "a\\b", "true"]
+NAMES = [
+    "a b (1).off",
+    "it's.ply",
+    "x=y.obj",
+    "[1].off",
+    "é~#,{}.off",
+    "2024",
+    "null",
+    'a"b.off',
+    "a\\b",
+    "true",
+    "-dash.off",
+    "~tilde.off",
+]
 
 
 def parsed(override: str) -> object:
@@ -88,3 +102,12 @@ def test_a_word_too_many_is_named(command, typed, said):
 def test_only_near_names_are_offered():
     assert nearest_names("adc", ["acd", "hks"]) == "; did you mean acd?"
     assert nearest_names("zzz", ["acd", "hks"]) == ""
+
+
+def test_a_name_like_a_flag_or_a_reference_is_a_path_where_there_is_such_a_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("-dash.off", "${HOME}.off", "b.off"):
+        (tmp_path / name).touch()
+    assert to_overrides("match", ["-dash.off", "b.off"]) == ["source='-dash.off'", "target='b.off'"]
+    (override, _) = to_overrides("match", ["${HOME}.off", "b.off"])
+    assert OmegaConf.create({"source": parsed(override)}).source == "${HOME}.off"

@@ -39,7 +39,10 @@ def test_folders_without_meshes_say_where_they_are(tmp_path):
     made.shrec19(tmp_path / "shrec")
     with pytest.raises(DataError, match=r"did you mean .*FAUST_5k, .*shrec"):
         recognise(tmp_path)
+    (tmp_path / "empty").mkdir()
     with pytest.raises(DataError, match="no meshes that csm can read; wanted one of: MPI-FAUST"):
+        recognise(tmp_path / "empty")
+    with pytest.raises(DataError, match="nowhere: there is no such folder"):
         recognise(tmp_path / "nowhere")
 
 

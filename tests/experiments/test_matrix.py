@@ -13,7 +13,7 @@ from csm.errors import ConfigError, DataError
 from csm.evaluation import EvaluationProtocol
 from csm.evaluation.report import ResultRow, read_rows
 from csm.experiments import matrix as module
-from csm.experiments.matrix import Matrix, Row, require_same_training
+from csm.experiments.matrix import Matrix, Row, keep_training, require_same_training
 from csm.experiments.resuming import last_checkpoint
 from csm.experiments.training import Training
 from csm.matching.network import load_model
@@ -215,7 +215,7 @@ def test_the_record_of_an_earlier_version_is_understood(tmp_path):
 
 
 def test_a_record_is_made_once_and_holds_plain_data(tmp_path):
-    require_same_training(tmp_path / "new", TODAY)
+    keep_training(tmp_path / "new", TODAY)
     kept = json.loads((tmp_path / "new/row.json").read_text())
     assert (kept["data._target_"], kept["model.channels"]) == ("FaustDataModule", [16, 16])
     require_same_training(tmp_path / "new", TODAY)
@@ -225,3 +225,19 @@ def test_a_record_is_made_once_and_holds_plain_data(tmp_path):
 def test_a_matrix_survives_pickling(tmp_path):
     again = pickle.loads(pickle.dumps(Matrix(tmp_path, PROTOCOL, ("nearest",))))
     assert (again.folder, again.protocol) == (tmp_path, PROTOCOL)
+
+
+@pytest.mark.parametrize("content", [None, "{", "[]"])
+def test_without_its_settings_a_folder_is_judged_by_its_network(bench, content, caplog):
+    bench.fill([bench.row()])
+    path = bench.folder / "cells/one/seed0/row.json"
+    path.unlink() if content is None else path.write_text(content)
+    bench.fill([bench.row()])
+    assert bench.trained == []
+    assert json.loads(path.read_text())["seed"] == 0
+    path.unlink() if content is None else path.write_text(content)
+    other = Row("one", 0, lambda: a_training(bench.folder, name="one", options={"lr": 0.5}), IDENTITY)
+    with pytest.raises(ConfigError, match=r"lr: 0\.01 there, 0\.5 wanted"):
+        bench.fill([other])
+    with pytest.raises(ConfigError, match="lr: 0"):
+        bench.fill([other])
