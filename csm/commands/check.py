@@ -81,7 +81,7 @@ def _is_of_one_template(shapes: FolderSet) -> bool:
     if not any(isinstance(entry.truth, SameFaces) for entry in shapes.entries):
         return True
     known = sum(_has_truth(shapes, name) for name in shapes.names)
-    return known > 1 or len(shapes.names) == 1
+    return 2 * known > len(shapes.names)
 
 
 def _has_truth(shapes: FolderSet, name: str) -> bool:

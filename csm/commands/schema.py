@@ -51,7 +51,7 @@ RANGES: Mapping[str, Range] = {
     "seed": Range(True, 0, 2**32 - 1),
     "workers": Range(True, 0, none=True),
     "unused_days": Range(False, 0, none=True),
-    "debris": Range(False, 0, 1),
+    "debris": Range(False, 0, 1, none=True),
     "tolerance": Range(False, 0, 1),
     "trainer.max_epochs": _COUNT,
     "trainer.check_val_every_n_epoch": _SOME,

@@ -126,8 +126,13 @@ def features_of(mesh: Mesh, descriptor: Descriptor, store: Store, operators: Ope
 
 
 def _key(mesh: Mesh, descriptor: Descriptor) -> dict[str, Any]:
-    """Return what a descriptor is looked up by; before version 0.2 debris was not left out, so it has another key."""
-    return record(descriptor) if body_of(mesh).n_debris == 0 else {**record(descriptor), "without": "debris"}
+    """Return what a descriptor is looked up by; what is treated otherwise than in version 0.1 has another key."""
+    body, key = body_of(mesh), record(descriptor)
+    if body.n_debris:
+        key["without"] = "debris"
+    if descriptor.by_component and body.n_components > 1:
+        key["by"] = "component"
+    return key
 
 
 def prepare_mesh(mesh: Mesh, recipe: Recipe, store: Store, operators: Operators | None = None) -> Prepared:

@@ -61,6 +61,8 @@ class ACD(ByAngle):
     and wolves.  `paper` has the settings of the text of the paper (140 columns), `release` those of its published code
     (48 columns).
 
+    Each component of a mesh has its own spectrum, and one with fewer vertices than K all the eigenpairs that it has.
+
     Block j of a mirror image is block -j mod J of the original.  Faces must be oriented outwards: inside out, convex
     and concave change places as well, and the block of theta is the original's of pi/2 - theta.
 
@@ -86,6 +88,7 @@ class ACD(ByAngle):
 
     name: ClassVar[str] = "acd"
     added: ClassVar[Mapping[str, Any]] = {"damping": 0.0}
+    by_component: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if self.angles < 1 or self.order < 0 or not self.alpha >= 0:
@@ -125,9 +128,11 @@ class ACD(ByAngle):
 
     def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, one column per name, in units of 1/area unless normalised."""
-        spectra = [self._spectrum(operators, theta) for theta in self.thetas]
+        most = min(self.k, operators.mesh.n_vertices)  # a cube has 8 vertices, and no more eigenpairs
+        spectra = [self._spectrum(operators, theta, most) for theta in self.thetas]
+        ks = [min(k, most) for k in self._ks]
         damping = np.arange(1, self.order + 2) ** -self.damping
-        values = np.hstack([chebyshev_block(s.first(k), self.order) * damping for s in spectra for k in self._ks])
+        values = np.hstack([chebyshev_block(s.first(k), self.order) * damping for s in spectra for k in ks])
         if self.centred:
             values -= operators.mass @ values / operators.mass.sum()
         return Features(unit_rows(values) if self.normalise else values, self.columns)

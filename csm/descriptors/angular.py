@@ -31,7 +31,8 @@ class ByAngle(Descriptor):
         if self.alpha == 0 and self.angles != 1:
             raise ConfigError(f"{self}: at alpha=0 all {self.angles} blocks would be equal; set angles=1")
 
-    def _spectrum(self, operators: Operators, theta: float) -> Spectrum:
+    def _spectrum(self, operators: Operators, theta: float, k: int | None = None) -> Spectrum:
+        k = self.k if k is None else k
         if self.alpha == 0:
-            return operators.lbo(self.k)
-        return operators.albo(self.alpha, theta, self.k, frame=self.frame, sweeps=self.sweeps, smoothing=self.smoothing)
+            return operators.lbo(k)
+        return operators.albo(self.alpha, theta, k, frame=self.frame, sweeps=self.sweeps, smoothing=self.smoothing)

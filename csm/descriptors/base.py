@@ -65,6 +65,9 @@ class Descriptor(ABC):
 
     Attributes
     ----------
+    by_component
+        Whether it is evaluated on each component by itself, at the scale of the whole: the few smallest eigenvalues of
+        a mesh of several components are those of the larger ones, and say nothing of the others.
     name
         What stored results and checkpoints call the family.
     version
@@ -77,6 +80,7 @@ class Descriptor(ABC):
     name: ClassVar[str]
     version: ClassVar[int] = 1
     added: ClassVar[Mapping[str, Any]] = {}
+    by_component: ClassVar[bool] = False
 
     @property
     def eigenpairs(self) -> int:
@@ -93,10 +97,19 @@ class Descriptor(ABC):
         Debris takes no part (`csm.mesh.debris`); a vertex of it has the row of the nearest vertex of the body.
         """
         operators = as_operators(shape)
+        if operators.body is None and self.by_component and operators.n_components > 1:
+            return self._by_component(operators)
         if operators.body is None:
             return self.evaluate(operators)
-        features = self.evaluate(operators.body.operators)
+        features = self(operators.body.operators)
         return Features(features.values[operators.body.nearest], features.columns)
+
+    def _by_component(self, operators: Operators) -> Features:
+        parts = [(part.vertices, self.evaluate(part.operators)) for part in operators.parts()]
+        values = np.zeros((operators.mesh.n_vertices, parts[0][1].shape[1]))
+        for vertices, features in parts:
+            values[vertices] = features.values
+        return Features(values, parts[0][1].columns)
 
     @abstractmethod
     def evaluate(self, operators: Operators) -> Features:

@@ -127,8 +127,8 @@ def require_same_settings(path: Path, module: CSMModule, epochs: int | None = No
     if changed:
         told = "; ".join(f"{key}: {kept.get(key)} there, {wanted.get(key)} wanted" for key in changed)
         raise ConfigError(
-            f"{path}: was trained with other settings ({told}); go on with those, or begin anew (resume=null, or another "
-            "folder)"
+            f"{path}: was trained with other settings ({told}); go on with those, or begin anew (resume=null, or "
+            "another folder)"
         )
 
 

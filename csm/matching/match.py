@@ -125,7 +125,7 @@ def match_meshes(
 
 def _notes(source: Subject, target: Subject) -> tuple[str, ...]:
     said = [f"{subject.given.label}: {note}" for subject in (source, target) for note in subject.notes]
-    return (*said, *_compared(source, target))
+    return tuple(dict.fromkeys([*said, *_compared(source, target)]))
 
 
 def _compared(source: Subject, target: Subject) -> list[str]:

@@ -19,11 +19,11 @@ from csm._types import BoolArray, FloatArray, IntArray
 from csm.errors import ConfigError, MeshError
 from csm.mesh.check import FLAT
 from csm.mesh.debris import DEBRIS, body_of
-from csm.mesh.mending import collapsed, sound_faces, split, turns, welded
+from csm.mesh.mending import collapsed, joined_short_edges, sound_faces, split, turns, welded
 from csm.mesh.polygons import PolygonMesh, triangulated
 from csm.mesh.shape import Mesh, require_mesh
 
-SAME_PLACE = 1e-7
+SAME_PLACE = 1e-5
 """Distance below which boundary vertices are welded, as a fraction of the bounding box's diagonal."""
 
 STEPS = ("weld", "split", "debris", "orient")
@@ -81,7 +81,7 @@ def clean(
     *,
     weld: bool = True,
     split: bool = True,
-    debris: float = DEBRIS,
+    debris: float | None = None,
     orient: bool = True,
     tolerance: float = SAME_PLACE,
 ) -> Cleaned:
@@ -94,7 +94,8 @@ def clean(
     weld, split, orient
         Whether to take these steps.
     debris
-        Components below this fraction of the area go; 0 keeps all.
+        Components below this fraction of the area go; 0 keeps all; None for the rule of `csm.mesh.debris`: below 1 %
+        each, and 2 % together.
     tolerance
         Of welding, as a fraction of the bounding box's diagonal.
 
@@ -114,20 +115,21 @@ def clean(
     >>> done.text
     '2 vertices welded to another at the same place; 1 vertices in no face left out'
     """
-    for name, value in (("debris", debris), ("tolerance", tolerance)):
-        if not 0 <= value < 1:
+    for name, value in (("debris", 0.0 if debris is None else debris), ("tolerance", tolerance)):
+        if isinstance(value, str) or not 0 <= value < 1:
             raise ConfigError(f"{name}={value}; wanted a fraction from 0 to below 1")
     require_finite(mesh if isinstance(mesh, PolygonMesh) else require_mesh(mesh))
     work = _Work.of(mesh)
     unsound = work.drop_unsound_faces()  # a face that is there twice has no boundary to be welded
     if weld:
         work.weld(tolerance)
+    work.join_short()
     work.note_unsound_faces(unsound + work.drop_unsound_faces())
     work.collapse()
     if split:
         work.split()
     lone = ~work.used()
-    if debris:
+    if debris != 0:
         work.drop_debris(debris)
     work.drop_unused(lone)
     if orient:
@@ -200,6 +202,11 @@ class _Work:
         count = self._join(welded(self.vertices, self.faces, tolerance))
         self._did("weld", count, "vertices welded to another at the same place")
 
+    def join_short(self) -> None:
+        """Join the ends of edges of no length, which have no place in a Laplacian."""
+        count = self._join(joined_short_edges(self.vertices, self.faces))
+        self._did("short", count, "vertices joined with a neighbour at the same place")
+
     def _keep_faces(self, kept: BoolArray) -> int:
         self.faces, self.face_map = self.faces[kept], self.face_map[kept]
         return int((~kept).sum())
@@ -227,13 +234,14 @@ class _Work:
         count = len(origin) - before
         self._did("split", count, "copies of vertices made where the surface was no manifold")
 
-    def drop_debris(self, fraction: float) -> None:
-        body = body_of(Mesh(self.vertices, self.faces), fraction)
+    def drop_debris(self, fraction: float | None) -> None:
+        mesh = Mesh(self.vertices, self.faces)
+        body = body_of(mesh) if fraction is None else body_of(mesh, fraction, together=1.0)
         if body.n_debris:
             self._keep_faces(body.faces)
             much = "; WARNING: that is most of it" if body.area_left_out > 0.5 else ""
             text = (
-                f"pieces of debris left out: each below {fraction:.2g} of the area, together "
+                f"pieces of debris left out: each below {fraction or DEBRIS:.2g} of the area, together "
                 f"{body.area_left_out:.2%}{much}"
             )
             self._did("debris", body.n_debris, text)

@@ -15,7 +15,10 @@ from csm.mesh.shape import Mesh
 from csm.mesh.topology import components, half_edges
 
 DEBRIS = 0.01
-"""A component with less than this fraction of the surface area is debris; the largest one never is."""
+"""A component with less than this fraction of the surface area is debris, unless too much is (`TOGETHER`)."""
+
+TOGETHER = 0.02
+"""Fraction of the area that debris has together at most: many small parts are no debris but the shape."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +85,10 @@ def unit_area(mesh: Mesh) -> Mesh:
     return mesh.unit_area(None if body.n_debris == 0 else body.area)
 
 
-def body_of(mesh: Mesh, debris: float = DEBRIS) -> Body:
+def body_of(mesh: Mesh, debris: float = DEBRIS, together: float = TOGETHER) -> Body:
     """Return the components of a mesh that have at least the fraction `debris` of its area; the largest always counts.
+
+    What is left out, the smallest components first, has at most the fraction `together` of the area.
 
     Examples
     --------
@@ -97,9 +102,17 @@ def body_of(mesh: Mesh, debris: float = DEBRIS) -> Body:
     used = np.zeros(len(areas), dtype=bool)
     used[label[mesh.faces[:, 0]]] = True
     has_area = np.isfinite(total) and total > 0
-    kept = used & (areas >= min(debris * total, areas.max())) if has_area else used
+    kept = used & ~_small(areas, debris * total, together * total) if has_area else used
     vertices: BoolArray = kept[label]
     faces: BoolArray = kept[label[mesh.faces[:, 0]]]
     area = float(areas[kept].sum())
     left_out = 1 - area / total if total > 0 else 0.0
     return Body(vertices, faces, int(kept.sum()), int((used & ~kept).sum()), area, max(left_out, 0.0))
+
+
+def _small(areas: FloatArray, least: float, most_together: float) -> BoolArray:
+    """Return the least areas, each below `least` and together at most `most_together`; like ones stay together."""
+    ordered = np.sort(areas)
+    sums = np.cumsum(ordered)[np.searchsorted(ordered, 1.001 * areas, side="right") - 1]
+    small: BoolArray = (areas < least) & (areas < ordered[-1]) & (sums <= most_together)
+    return small

@@ -63,6 +63,19 @@ def welded(vertices: FloatArray, faces: IntArray, tolerance: float) -> IntArray:
     return first
 
 
+NO_LENGTH = 1e-9
+"""An edge shorter than this fraction of the bounding box's diagonal has no length."""
+
+
+def joined_short_edges(vertices: FloatArray, faces: IntArray) -> IntArray:
+    """Return for each vertex the first of those that edges of no length (`NO_LENGTH`) join it with; shape (N,)."""
+    tails, heads = faces.ravel(), faces[:, [1, 2, 0]].ravel()
+    diagonal = float(np.linalg.norm(np.ptp(vertices[np.unique(faces)], axis=0))) if faces.size else 0.0
+    short = np.linalg.norm(vertices[tails] - vertices[heads], axis=1) <= NO_LENGTH * diagonal
+    group = components(tails[short], heads[short], len(vertices))
+    return np.unique(group, return_index=True)[1][group]
+
+
 def sound_faces(faces: IntArray) -> BoolArray:
     """Return which faces, (M,), have three different corners and do not repeat an earlier face, in whatever order."""
     a, b, c = faces.T

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Protocol
@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from csm._types import Arrays, FloatArray, IntArray
 from csm.mesh.check import require_usable
-from csm.mesh.debris import Body, body_of
+from csm.mesh.debris import Body, body_of, component_areas
 from csm.mesh.debris import unit_area as with_unit_area
 from csm.mesh.shape import Mesh, require_mesh
 from csm.operators.frames import FrameKind, face_frames
@@ -91,6 +91,8 @@ class Operators:
         The (rescaled) mesh that every result refers to; without debris it has an area of 1.
     body
         The operators of the mesh without its debris; None if there is none.
+    n_components
+        Number of components that are no debris.
     """
 
     def __init__(self, mesh: Mesh, *, unit_area: bool = True, memo: Memo | None = None) -> None:
@@ -98,11 +100,23 @@ class Operators:
         found = body_of(mesh)
         self.mesh = with_unit_area(mesh) if unit_area else mesh
         self._debris = found.note
+        self.n_components = found.n_components
         self.body = None if found.is_all else _body(self.mesh, found, memo)
         self._memo = memo
+        self._said_flat = False
         self._areas: FloatArray | None = None
         self._anisotropic: dict[tuple[FrameKind, int, float], AnisotropicStiffness] = {}
         self._spectra: dict[tuple[str, tuple[tuple[str, Any], ...]], Spectrum] = {}
+
+    def parts(self) -> Iterator[OperatorsOfBody]:
+        """Yield the operators of each component of the body by itself, at the scale of the whole."""
+        label = component_areas(self.mesh)[0]
+        for number in np.unique(label[self.mesh.faces[:, 0]]):
+            inside = label == number
+            vertices = np.flatnonzero(inside)
+            faces = (np.cumsum(inside) - 1)[self.mesh.faces[inside[self.mesh.faces[:, 0]]]]
+            part = replace(self.mesh, vertices=self.mesh.vertices[vertices], faces=faces)
+            yield OperatorsOfBody(Operators(part, unit_area=False, memo=self._memo), vertices, np.zeros(0, np.int64))
 
     @property
     def mass(self) -> FloatArray:
@@ -168,7 +182,9 @@ class Operators:
         if flat.size == 0:
             return spectrum
         note = f"{flat.size} faces have (almost) no area, the first is face {flat[0]}; the Laplacian floors their area"
-        _log.warning("%s: %s", self.mesh.label, note)
+        if not self._said_flat:
+            _log.warning("%s: %s", self.mesh.label, note)
+            self._said_flat = True
         return replace(spectrum, notes=(*spectrum.notes, note))
 
     def _spectrum(self, kind: str, params: dict[str, Any], solve: Callable[[], Spectrum]) -> Spectrum:

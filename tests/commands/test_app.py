@@ -77,11 +77,12 @@ def test_a_failing_call_is_one_paragraph_with_status_2_and_leaves_nothing(csm, t
     assert visible(tmp_path) == {"nan.off"}
 
 
-def test_a_defect_keeps_its_traceback_and_has_status_1(csm, monkeypatch):
+def test_a_defect_keeps_its_traceback_and_has_status_1(csm, tmp_path, monkeypatch):
     def broken(*args, **options):
         raise ZeroDivisionError("a defect")
 
     monkeypatch.setattr("csm.commands.check.check_files", broken)
+    write_mesh(tmp_path / "a.off", blob(1))
     status, _, error = csm("check", "a.off")
     assert status == 1
     assert "Traceback" in error
@@ -238,10 +239,12 @@ def test_jobs_of_a_sweep_do_not_replace_each_others_match(csm, tmp_path):
 def test_a_match_that_fails_while_it_writes_leaves_nothing_and_can_be_repeated(csm, tmp_path, monkeypatch):
     write_mesh(tmp_path / "a.off", blob(2))
     words = ["match", "a.off", "a.off", "descriptor=gps", "out=r"]
+
+    def full(*args):
+        raise OSError(28, "No space left on device", "r/match.html")
+
     with monkeypatch.context() as broken:
-        broken.setattr(
-            "csm.viewer.match_folder.write_html", lambda *a: (_ for _ in ()).throw(OSError(28, "full", "r/x"))
-        )
+        broken.setattr("csm.viewer.match_folder.write_html", full)
         status, _, error = csm(*words)
     assert status == 2
     assert "the disk is full" in error

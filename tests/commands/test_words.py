@@ -9,20 +9,8 @@ from omegaconf import OmegaConf
 from csm.commands.words import nearest_names, quoted, to_overrides
 from csm.errors import ConfigError
 
-NAMES = [
-    "a b (1).off",
-    "it's.ply",
-    "x=y.obj",
-    "[1].off",
-    "é~#,{}.off",
-    "2024",
-    "null",
-    'a"b.off',
-    "a\\b",
-    "true",
-    "-dash.off",
-    "~tilde.off",
-]
+NAMES = ["a b (1).off", "it's.ply", "x=y.obj", "[1].off", "é~#,{}.off", "2024", "null", 'a"b.off', "a\\b", "true"]
+NAMES += ["-dash.off", "~tilde.off"]
 
 
 def parsed(override: str) -> object:

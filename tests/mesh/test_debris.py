@@ -40,14 +40,27 @@ def test_components_of_some_size_all_belong():
     assert areas[1] / areas.sum() > DEBRIS
 
 
-def test_where_all_components_are_small_the_largest_stays():
+def test_where_all_components_are_small_none_is_debris():
     triangle = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     vertices = np.concatenate([triangle * (1.5 if i == 130 else 1) + 3 * i for i in range(200)])
-    body = body_of(Mesh(vertices, np.arange(600).reshape(200, 3)))
-    assert np.flatnonzero(body.vertices).tolist() == [390, 391, 392]
+    mesh = Mesh(vertices, np.arange(600).reshape(200, 3))
+    assert body_of(mesh).is_all
+    assert np.flatnonzero(body_of(mesh, together=1.0).vertices).tolist() == [390, 391, 392], "the largest always counts"
 
 
 def test_a_point_cloud_has_no_body():
     body = body_of(Mesh(plane().vertices, np.zeros((0, 3), int)))
     assert not body.vertices.any()
     assert body.area == 0
+
+
+def test_many_small_parts_are_the_shape_and_no_debris():
+    ball = sphere(2)
+    bolts = [0.06 * ball.vertices + [3 + i, 0, 0] for i in range(40)]  # 0.4 % of the ball's area each
+    dust = [0.001 * ball.vertices + [0, 3 + i, 0] for i in range(5)]
+    vertices = np.concatenate([ball.vertices, *bolts, *dust])
+    faces = np.concatenate([ball.faces + i * ball.n_vertices for i in range(46)])
+    body = body_of(Mesh(vertices, faces))
+    assert (body.n_components, body.n_debris) == (41, 5)
+    assert body.vertices[: 41 * ball.n_vertices].all()
+    assert body_of(Mesh(vertices, faces), 0.01, together=1.0).n_components == 1

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from csm.mesh.check import check
-from csm.mesh.mending import collapsed, sound_faces, split, turns, welded
+from csm.mesh.mending import collapsed, joined_short_edges, sound_faces, split, turns, welded
 from csm.mesh.shape import Mesh
 from tests.shapes import blob, cylinder, plane, sphere, torus
 
@@ -143,3 +143,13 @@ def test_a_moebius_strip_is_left_as_it_is():
     found = turns(np.vstack([edge(1.0), edge(-1.0)]), faces)
     assert found.n_one_sided == 1
     assert not found.flip.any()
+
+
+def test_ends_of_edges_of_no_length_are_joined():
+    square = plane(6)
+    vertices = np.vstack([square.vertices, square.vertices[14]])
+    face = next(i for i, f in enumerate(square.faces) if 14 in f)
+    faces = np.vstack([square.faces, [[14, 36, square.faces[face][(list(square.faces[face]).index(14) + 1) % 3]]]])
+    target = joined_short_edges(vertices, faces)
+    assert target[36] == 14
+    assert (target[:36] == np.arange(36)).all()

@@ -74,7 +74,7 @@ def read_header(data: bytes) -> Header:
             if order is None:
                 raise MeshError("the PLY header names no format")
             return Header(order, elements, end)
-        if not words or words[0] in ("comment", "obj_info", "ply"):
+        if not words or words[0].lower() in ("comment", "obj_info", "ply"):
             continue
         if words[0] == "format" and len(words) > 1 and words[1] in _FORMATS:
             order = _FORMATS[words[1]]
@@ -89,9 +89,9 @@ def read_header(data: bytes) -> Header:
 
 def _header_lines(data: bytes) -> Iterator[tuple[str, int]]:
     """Yield the lines of the header and where each ends; lines may end in any of the three ways."""
-    if not re.match(rb"ply\s*?[\r\n]", data[:80]):
+    if not re.match(rb"(?i:ply)\s*?[\r\n]", data[:80]):
         return
-    separator = b"\r" if re.match(rb"ply[ \t]*\r(?!\n)", data[:80]) else b"\n"
+    separator = b"\r" if re.match(rb"(?i:ply)[ \t]*\r(?!\n)", data[:80]) else b"\n"
     at = 0
     while (end := data.find(separator, at)) >= 0:
         yield data[at:end].decode("latin-1"), end + 1
