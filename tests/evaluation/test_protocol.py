@@ -7,9 +7,16 @@ import pickle
 import numpy as np
 import pytest
 
-from csm.errors import ConfigError, DataError
+from csm.data.shapes import InMemory, Shape
+from csm.data.store import Store
+from csm.errors import ConfigError, DataError, MeshError
 from csm.evaluation import EvaluationProtocol
+from csm.evaluation.engine import evaluate
+from csm.matching import PrecomputedMethod
+from csm.mesh.correspondence import PointMap
+from csm.mesh.shape import Mesh
 from tests.evaluation.toys import N, to_shape
+from tests.shapes import sphere
 
 WHOLE = to_shape(np.arange(N))
 PART = to_shape(np.where(np.arange(N) % 3 == 0, -1, np.arange(N)))
@@ -166,3 +173,35 @@ def test_only_shapes_of_one_template_make_a_pair() -> None:
 def test_a_name_that_is_given_twice_is_refused() -> None:
     with pytest.raises(DataError, match="3 shapes have only 2 different names; 's1' is there twice"):
         EvaluationProtocol().choose(["s0", "s1", "s1"])
+
+
+def with_a_fin(mesh: Mesh) -> Mesh:
+    a, b, _ = mesh.faces[0]
+    vertices = np.vstack([mesh.vertices, 1.5 * mesh.vertices[a]])
+    return Mesh(vertices, np.vstack([mesh.faces, [[a, b, mesh.n_vertices]]]), "finned")
+
+
+def test_where_exact_distances_are_impossible_another_kind_is_taken_if_it_is_allowed(caplog):
+    exact, heat = EvaluationProtocol(), EvaluationProtocol(fallback="heat")
+    assert exact.distance_on(with_a_fin(sphere(2))) == "exact"
+    assert heat.distance_on(sphere(2)) == "exact"
+    assert caplog.text == ""
+    assert heat.distance_on(with_a_fin(sphere(2))) == "heat"
+    assert "finned: is no manifold, so its distances are measured by the method 'heat'" in caplog.text
+    assert "no manifold: geodesic distance by the heat method" in heat.describe()
+    assert "manifold" not in exact.describe()
+    with pytest.raises(ConfigError, match="fallback='exact'"):
+        EvaluationProtocol(fallback="exact")
+
+
+def test_a_set_with_fins_is_measured_with_the_fallback_and_refused_without(tmp_path):
+    finned = with_a_fin(sphere(2))
+    other = Mesh(finned.vertices * [1, 1.2, 0.9], finned.faces, "other")
+    truth = PointMap.identity(finned.n_vertices, finned.n_vertices)
+    shapes = InMemory([Shape(finned, truth), Shape(other, truth)], "fins")
+    method = PrecomputedMethod({m.name: m.vertices for m in (finned, other)})
+    options = {"store": Store(tmp_path), "workers": 1, "progress": False}
+    with pytest.raises(MeshError, match="exact geodesics need a manifold"):
+        evaluate(method, shapes, EvaluationProtocol(), **options)
+    (found,) = evaluate(method, shapes, EvaluationProtocol(fallback="edge"), **options)
+    assert np.isfinite(found.summary["age"])
