@@ -32,7 +32,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     done = clean(
         mesh, weld=cfg.weld, split=cfg.split, debris=cfg.debris, orient=cfg.orient, tolerance=float(cfg.tolerance)
     )
-    write_cleaned(done, source, target)
+    write_cleaned(done, source, target, len(mesh.sizes))
     report(done, source, target)
     return {"vertices": done.mesh.n_vertices, "faces": done.mesh.n_faces, "steps": len(done.mends)}
 
@@ -47,7 +47,7 @@ def account_of(target: Path) -> Path:
     return target.with_name(f"{target.stem}.clean.json")
 
 
-def write_cleaned(done: Cleaned, source: Path, target: Path) -> None:
+def write_cleaned(done: Cleaned, source: Path, target: Path, n_faces: int) -> None:
     """Write the mesh, the maps and the account."""
     mesh_file, old_to_new, new_to_old = places(target)
     write_mesh(mesh_file, done.mesh)
@@ -61,7 +61,7 @@ def write_cleaned(done: Cleaned, source: Path, target: Path) -> None:
         "out": str(target),
         "steps": [{"kind": mend.kind, "count": mend.count, "text": mend.text} for mend in done.mends],
         "vertices": {"before": len(done.vertex_map), "after": done.mesh.n_vertices},
-        "faces": {"after": done.mesh.n_faces},
+        "faces": {"before": n_faces, "after": done.mesh.n_faces},
         "findings": [finding.text for finding in check(done.mesh)],
         "files": {path.name: digest(path) for path in places(target)},
         "command": made.command,
@@ -81,7 +81,9 @@ def report(done: Cleaned, source: Path, target: Path) -> None:
     remaining = [finding.text for finding in check(done.mesh)]
     print("nothing had to be mended" if not done.mends else f"{len(done.mends)} steps changed the mesh", end="; ")
     print("nothing remains" if not remaining else f"what remains: {'; '.join(remaining)}")
-    print(f"{len(done.vertex_map)} vertices -> {done.mesh.n_vertices}: {', '.join(map(str, places(target)))}")
+    print(
+        f"{len(done.vertex_map)} vertices -> {done.mesh.n_vertices}: {', '.join(map(str, [*places(target), account_of(target)]))}"
+    )
 
 
 main = command("clean")(run)

@@ -169,7 +169,10 @@ def _unknown_key(key: str, config_name: str) -> str:
     if key in keys:
         return f"{key} cannot be set or left out in this way; --help and --cfg job show what it may be"
     last = {name.rpartition(".")[2]: name for name in keys}
-    near = nearest_names(key, keys) or nearest_names(key.rpartition(".")[2], last)
+    near = nearest_names(key, keys)
+    if not near and key.rpartition(".")[2] in last:
+        near = f"; did you mean {last[key.rpartition('.')[2]]}?"
+    near = near or nearest_names(key.rpartition(".")[2], last)
     return f"there is no option {key!r}{near}; --help lists the options, --cfg job the settings of what is chosen"
 
 

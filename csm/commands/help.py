@@ -79,9 +79,11 @@ def help_text(command: str, config_name: str, more: str = "") -> str:
     lines += [more, ""] if more else []
     lines += ["options, with their defaults:", *_table([(f"{key}={value}", text) for key, value, text in own])]
     for group, choice, _ in page.groups:
+        if group.startswith("hydra"):
+            continue
         rows = [(f"{group}.{key}={value}", text) for key, value, text in _settings(group, choice)]
         lines += ["", f"settings of the group {group}:", *_table(rows)] if rows else []
-    groups = [row for row in page.groups if len(options_of(row[0])) > 1]
+    groups = [row for row in page.groups if len(options_of(row[0])) > 1 and not row[0].startswith("hydra")]
     if groups:
         lines += ["", "groups, of which one option each is chosen as GROUP=OPTION:"]
         lines += _table([(group, _choices(group, choice, text)) for group, choice, text in groups])

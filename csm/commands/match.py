@@ -32,10 +32,12 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     write_match(match, folder, text, time.perf_counter() - begun)
     for note in match.notes:
         print(f"note: {note}")
+    unmatched = f"{match.map.n_unmatched} of them without a partner; " if match.map.n_unmatched else ""
     print(
         f"{match.source.name} ({match.source.n_vertices} vertices) -> {match.target.name} "
-        f"({match.target.n_vertices} vertices) by {text}; "
-        f"{100 * match.coverage:.1f} % of the target is reached: {folder}\n{match.confidence.verdict}"
+        f"({match.target.n_vertices} vertices) by {text}: {unmatched}{100 * match.coverage:.1f} % of the target's "
+        f"vertices are reached\n{match.confidence.verdict}\n{folder}: map.txt, match.html (to look at), match.json "
+        "(how it was made)"
     )
     return {"coverage": match.coverage, "returned": match.confidence.returned, "vertices": match.source.n_vertices}
 

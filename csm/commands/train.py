@@ -36,6 +36,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     require_device(cfg.device)
     require_results(cfg.results)
     require_sound(training.data, test=cfg.test, exact=protocol.distance == "exact" and not protocol.fallback)
+    print(f"{training.name}: {training.data.protocol}; {len(training.data.split.test)} test shapes", flush=True)
     trained = fit(training, folder, cfg.resume)
     print(f"trained for {trained.seconds / 60:.1f} minutes: {trained.checkpoint}")
     found = {"seconds": trained.seconds, "checkpoint": str(trained.checkpoint), **trained.measured}

@@ -39,6 +39,10 @@ PATHS = frozenset(
 
 _OPTIONAL = ("experiment", "recipe")  # groups that may be left out: null for no option
 _ALONE = {"-m", "--multirun", "-r", "--run", "--resolve", "--help", "-h", "--hydra-help", "--version"}
+_WITH_VALUE = {
+    *("--cfg", "-c", "--package", "-p", "--shell-completion", "-sc", "--config-path", "-cp", "--config-name", "-cn"),
+    *("--config-dir", "-cd", "--experimental-rerun", "--info", "-i"),
+}
 _KEY = re.compile(r"[+~]{0,2}[A-Za-z_][\w./@:-]*")
 
 
@@ -84,6 +88,10 @@ def to_overrides(command: str, arguments: Sequence[str]) -> list[str]:
 def _is_option(argument: str, before: str) -> bool:
     """Tell whether an argument is a flag of Hydra, or the value of the flag before it."""
     if argument.startswith("-") and not Path(argument).exists():
+        flag, equals, _ = argument.partition("=")
+        if flag not in _ALONE and flag not in _WITH_VALUE:
+            meant = argument.lstrip("-") if equals else f"{argument.lstrip('-')}=VALUE"
+            raise ConfigError(f"{argument}: options are written without dashes, {meant}; --help lists them")
         return True
     return before.startswith("-") and before not in _ALONE and "=" not in before and not Path(before).exists()
 
@@ -193,5 +201,7 @@ def nearest_names(name: str, names: Iterable[str]) -> str:
     >>> nearest_names("adc", ["acd", "hks"])
     '; did you mean acd?'
     """
-    close = difflib.get_close_matches(name, list(names), n=3, cutoff=0.6)
+    known = list(names)
+    begun = [one for one in known if len(name) > 2 and one.startswith(name) and "." not in one]
+    close = list(dict.fromkeys([*begun, *difflib.get_close_matches(name, known, n=3, cutoff=0.6)]))[:3]
     return f"; did you mean {' or '.join(close)}?" if close else ""

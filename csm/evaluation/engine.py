@@ -160,7 +160,7 @@ def _by_name(things: Sequence[N], what: str) -> dict[str, N]:
     if len(named) != len(things) or not named:
         raise ConfigError(
             f"evaluate: {len(things)} {what} have the names {', '.join(t.name for t in things) or 'of none'}; "
-            "wanted one or more with different names"
+            "wanted one or more with different names, such as csm.matching.DescriptorMethod(csm.ACD(alpha=5.0), 'mild')"
         )
     return named
 

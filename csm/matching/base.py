@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -92,7 +93,8 @@ def require_device(device: str) -> str:
     try:
         torch.zeros(1, device=device).item()  # a device without numbers, such as "meta", is of no use
     except (RuntimeError, AssertionError, NotImplementedError) as error:
-        why = str(error).splitlines()[0]
+        known = re.match(r"(cpu|cuda|mps|xpu|meta)(:\d+)?$", str(device))
+        why = str(error).splitlines()[0] if known else "it knows no such device; wanted cpu, cuda, cuda:1 or mps"
         raise ConfigError(f"device={device}: PyTorch cannot use it here ({why}); device=cpu always works") from error
     return device
 

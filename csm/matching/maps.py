@@ -55,5 +55,10 @@ class VertexMap:
         """Fraction of the target's vertices that some vertex is mapped to."""
         return len(np.unique(self.indices[self.indices >= 0])) / self.n_target
 
+    @property
+    def n_unmatched(self) -> int:
+        """Number of vertices of the source without a partner (-1)."""
+        return int((self.indices < 0).sum())
+
     def __repr__(self) -> str:
         return f"VertexMap({self.source} -> {self.target}, {len(self.indices)} to {self.n_target} vertices)"

@@ -252,7 +252,8 @@ def _components(t: _Topology) -> Iterator[Finding]:
         body = body_of(t.mesh)
         if body.n_debris:
             out = first[~body.vertices[first]]
-            what = f"components of less than {DEBRIS:.0%} of the area (together {body.area_left_out:.2%}), left out"
+            share = f"together {body.area_left_out:.2%}"
+            what = f"components of less than {DEBRIS:.0%} of the area ({share}), which take no part"
             yield _found("debris", "note", what, np.sort(out), at="first vertices ")
 
 

@@ -94,8 +94,9 @@ def _account(match: Match, meaning: str, method: str) -> dict[str, Any]:
     return {
         "source": _of_mesh(match.source),
         "target": _of_mesh(match.target),
-        "map": f"{meaning}; 0-based",
+        "map": f"{meaning}; 0-based, -1 for none",
         "method": f"{match.matcher.name} neighbour in {method}",
+        "unmatched": match.map.n_unmatched,
         "coverage": match.coverage,
         "returned": match.confidence.returned,
         "verdict": match.confidence.verdict,

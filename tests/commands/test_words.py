@@ -90,6 +90,7 @@ def test_a_word_too_many_is_named(command, typed, said):
 def test_only_near_names_are_offered():
     assert nearest_names("adc", ["acd", "hks"]) == "; did you mean acd?"
     assert nearest_names("zzz", ["acd", "hks"]) == ""
+    assert nearest_names("exp", ["experiment", "sweeps"]) == "; did you mean experiment?"
 
 
 def test_a_name_like_a_flag_or_a_reference_is_a_path_where_there_is_such_a_file(tmp_path, monkeypatch):
@@ -99,3 +100,11 @@ def test_a_name_like_a_flag_or_a_reference_is_a_path_where_there_is_such_a_file(
     assert to_overrides("match", ["-dash.off", "b.off"]) == ["source='-dash.off'", "target='b.off'"]
     (override, _) = to_overrides("match", ["${HOME}.off", "b.off"])
     assert OmegaConf.create({"source": parsed(override)}).source == "${HOME}.off"
+
+
+@pytest.mark.parametrize(
+    ("typed", "meant"), [("--out=z", "out=z"), ("-out", "out=VALUE"), ("--epochs", "epochs=VALUE")]
+)
+def test_options_with_dashes_are_answered_with_how_they_are_written(typed, meant):
+    with pytest.raises(ConfigError, match=f"without dashes, {meant}"):
+        to_overrides("match", ["a", "b", typed])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -85,6 +86,8 @@ def read_polygons(path: str | os.PathLike[str], name: str | None = None, choose:
     if not isinstance(path, str | os.PathLike):
         raise ConfigError(f"a mesh is read from a file given by its path, got a {type(path).__name__}")
     given = os.fspath(path)
+    if not os.path.lexists(given):
+        raise MeshError(f"{given}: there is no such file{_near(given)}")
     suffix = _format(given)
     try:
         data = read_bytes(given)
@@ -95,6 +98,16 @@ def read_polygons(path: str | os.PathLike[str], name: str | None = None, choose:
     with parsing(given, suffix):
         raw = _parsed(data, given, suffix, choose)
         return PolygonMesh(raw.vertices, raw.corners, raw.sizes, name or _stem(given), given, raw.notes)
+
+
+def _near(path: str) -> str:
+    """Offer the files beside a missing one whose names are most like it."""
+    try:
+        names = os.listdir(os.path.dirname(path) or ".")
+    except OSError:
+        return ""
+    close = difflib.get_close_matches(os.path.basename(path), names, n=2, cutoff=0.85)
+    return f"; did you mean {' or '.join(close)}?" if close else ""
 
 
 def _format(path: str) -> str:
