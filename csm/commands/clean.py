@@ -81,9 +81,8 @@ def report(done: Cleaned, source: Path, target: Path) -> None:
     remaining = [finding.text for finding in check(done.mesh)]
     print("nothing had to be mended" if not done.mends else f"{len(done.mends)} steps changed the mesh", end="; ")
     print("nothing remains" if not remaining else f"what remains: {'; '.join(remaining)}")
-    print(
-        f"{len(done.vertex_map)} vertices -> {done.mesh.n_vertices}: {', '.join(map(str, [*places(target), account_of(target)]))}"
-    )
+    written = ", ".join(str(path) for path in [*places(target), account_of(target)])
+    print(f"{len(done.vertex_map)} vertices -> {done.mesh.n_vertices}: {written}")
 
 
 main = command("clean")(run)

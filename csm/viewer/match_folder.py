@@ -56,8 +56,8 @@ def _write_files(match: Match, folder: Path, method: str) -> dict[str, Any]:
     """Write all files but the account, which is returned."""
     source, target, indices = match.source, match.target, match.indices
     meaning = f"line i = vertex of {target.name} that vertex i of {source.name} is mapped to"
-    for name in ("map.txt", "map.npz"):
-        write_map(folder / name, indices, meaning=meaning)
+    write_map(folder / "map.txt", indices, meaning=meaning)
+    write_map(folder / "map.npz", indices, meaning=f"{meaning}; 0-based, -1 for none")
     reference = position_colors(target)
     colors = pull_colors(reference, indices)
     _write_confidence(folder / "confidence.txt", match)

@@ -166,7 +166,7 @@ def write_map(path: str | os.PathLike[str], indices: IntArray, *, meaning: str =
         raise DataError(f"{path}: point {np.flatnonzero(values < 0)[0]} has no counterpart, which .vts cannot say")
     with atomic_path(path) as temporary:
         if path.suffix == ".npz":
-            np.savez(temporary, indices=values, meaning=np.array(f"{meaning}; 0-based, -1 for none"))
+            np.savez(temporary, indices=values, meaning=np.array(meaning))
         else:
             head = [f"# {' '.join(meaning.split())}; 0-based, -1 for none"] if path.suffix == ".txt" else []
             base = 1 if path.suffix == ".vts" else 0

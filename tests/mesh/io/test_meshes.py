@@ -1,6 +1,7 @@
 import collections
 import gzip
 import random
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -55,10 +56,14 @@ def test_unknown_missing_and_empty_files(tmp_path):
         read_mesh(tmp_path / "a.off")
     with pytest.raises(MeshError, match=r"b\.off: there is no such file"):
         read_mesh(tmp_path / "b.off")
+    for name in ("a.fbx", "a"):
+        (tmp_path / name).write_text("content")
     with pytest.raises(MeshError, match=r"does not read \.fbx; wanted \.off, \.ply"):
         read_mesh(tmp_path / "a.fbx")
     with pytest.raises(MeshError, match="without a suffix"):
         read_mesh(tmp_path / "a")
+    with pytest.raises(MeshError, match=r"spot_half\.of: there is no such file; did you mean spot_half\.off"):
+        read_mesh(Path(__file__).parents[2] / "cases/spot_half.of")
 
 
 def test_polygons_give_a_sentence_that_names_clean_and_the_file_as_given(tmp_path, monkeypatch):
