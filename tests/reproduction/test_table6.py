@@ -24,6 +24,7 @@ def run(context: Context, **options: object) -> Findings:
     return Table6("table6", **options).run(context)  # type: ignore[arg-type]
 
 
+@pytest.mark.long
 def test_rows_have_parameters_seconds_memory_and_ratios_and_are_kept(context, monkeypatch):
     options = {"networks": ("csmcnn", "mlp"), "repeats": 2, "threads": 1}
     findings = run(context, **options)
@@ -80,6 +81,7 @@ def test_a_cost_is_measured_in_a_process_of_its_own(context):
     assert 0 < found["share"] < 1.5
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux hands a peak on")
 def test_the_memory_of_the_process_that_measures_does_not_hide_that_of_the_network(context):
     hparams = hparams_of("mlp")

@@ -87,6 +87,7 @@ def test_a_busy_machine_is_noted(context, asked, monkeypatch):
     assert findings.rows[0]["to acd"] is None
 
 
+@pytest.mark.long
 def test_it_runs_for_real_on_a_small_mesh(context, monkeypatch):
     monkeypatch.setattr(timing, "timed_mesh", lambda *_: (blob(2), "a blob"))
     (row,) = run(context, sizes=(162,), descriptors=("acd_paper",), threads=(1,), repeats=2).rows
