@@ -11,7 +11,7 @@ from tests.stress import Filling
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="kills and open files are those of Unix")
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_two_kills_among_three_processes_leave_what_one_alone_makes(tmp_path):
     filling = Filling(tmp_path, 4, seed=1)
     filling.kill(2, processes=3)
