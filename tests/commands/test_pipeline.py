@@ -128,7 +128,7 @@ def test_loggers_callbacks_and_trainers_are_chosen_by_a_word(bench, words, left)
     assert logs == ({left} if left else set())
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_number_of_workers_changes_nothing(bench, trained):
     rows = []
     for workers in (1, 2):

@@ -58,7 +58,9 @@ def test_several_downloads_at_once(tmp_path, call):
 
 
 @pytest.mark.data
-@pytest.mark.parametrize("script", SCRIPTS)
+@pytest.mark.parametrize(
+    "script", [pytest.param(s, marks=pytest.mark.long) if s in ("tosca", "faust_remeshed") else s for s in SCRIPTS]
+)
 def test_real_archives_are_laid_out(script, tmp_path, data_set, call):
     name = SCRIPTS[script]
     archive = data_folder() / f"{name}.tar.xz" if data_folder() else None

@@ -86,7 +86,7 @@ def read_polygons(path: str | os.PathLike[str], name: str | None = None, choose:
     if not isinstance(path, str | os.PathLike):
         raise ConfigError(f"a mesh is read from a file given by its path, got a {type(path).__name__}")
     given = os.fspath(path)
-    if not os.path.lexists(given):
+    if _is_missing(given):
         raise MeshError(f"{given}: there is no such file{_near(given)}")
     suffix = _format(given)
     try:
@@ -98,6 +98,16 @@ def read_polygons(path: str | os.PathLike[str], name: str | None = None, choose:
     with parsing(given, suffix):
         raw = _parsed(data, given, suffix, choose)
         return PolygonMesh(raw.vertices, raw.corners, raw.sizes, name or _stem(given), given, raw.notes)
+
+
+def _is_missing(path: str) -> bool:
+    try:
+        os.lstat(path)
+    except FileNotFoundError:
+        return True
+    except (OSError, ValueError):
+        return False  # reading says what is wrong with the name
+    return False
 
 
 def _near(path: str) -> str:
