@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 from omegaconf import DictConfig
 
-from csm.commands.app import command
+from csm.commands.app import command, write_json
 from csm.commands.outputs import digest, require_file_place, require_new_in_sweep, require_not_input, require_own
 from csm.errors import ConfigError
 from csm.evaluation.provenance import provenance
 from csm.mesh.check import check
 from csm.mesh.clean import Cleaned, clean
-from csm.mesh.io import atomic_path, read_polygons, write_map, write_mesh
+from csm.mesh.io import read_polygons, write_map, write_mesh
 
 
 def run(cfg: DictConfig) -> dict[str, Any]:
@@ -68,8 +67,7 @@ def write_cleaned(done: Cleaned, source: Path, target: Path, n_faces: int) -> No
         "commit": made.commit,
         "versions": made.versions,
     }
-    with atomic_path(account_of(target)) as temporary:
-        temporary.write_text(json.dumps(account, indent=1) + "\n", encoding="utf-8")
+    write_json(account_of(target), account)
 
 
 def report(done: Cleaned, source: Path, target: Path) -> None:

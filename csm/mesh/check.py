@@ -76,6 +76,13 @@ def check(mesh: Mesh) -> tuple[Finding, ...]:
     return tuple(sorted(findings, key=lambda f: f.severity != "error"))
 
 
+def flat_faces(mesh: Mesh) -> BoolArray:
+    """Return which faces, shape (M,), have no area, see `FLAT`."""
+    longest = (np.roll(mesh.corners, -1, axis=1) - mesh.corners) ** 2
+    flat: BoolArray = mesh.face_areas <= FLAT * longest.sum(axis=2).max(axis=1)
+    return flat
+
+
 def require_usable(mesh: Mesh) -> None:
     """Raise a MeshError that lists all errors `check` finds, if there are any."""
     errors = [finding.text for finding in check(mesh) if finding.severity == "error"]
@@ -157,8 +164,7 @@ def _degenerate(t: _Topology) -> Iterator[Finding]:
     mesh = t.mesh
     if mesh.n_faces == 0:
         return
-    longest = (np.roll(mesh.corners, -1, axis=1) - mesh.corners) ** 2
-    flat = mesh.face_areas <= FLAT * longest.sum(axis=2).max(axis=1)
+    flat = flat_faces(mesh)
     if flat.all():
         yield Finding("zero_total_area", mesh.n_faces, (), "error", "no face has an area, so there is no surface")
     elif flat.any():

@@ -17,7 +17,7 @@ import numpy as np
 
 from csm._types import BoolArray, FloatArray, IntArray
 from csm.errors import ConfigError, MeshError
-from csm.mesh.check import FLAT
+from csm.mesh.check import flat_faces
 from csm.mesh.debris import DEBRIS, body_of
 from csm.mesh.mending import collapsed, joined_short_edges, sound_faces, split, turns, welded
 from csm.mesh.polygons import PolygonMesh, triangulated
@@ -180,13 +180,6 @@ class _Work:
         if count:
             self.mends.append(Mend(kind, count, f"{count} {text}"))
 
-    def _flat(self) -> BoolArray:
-        corners = self.vertices[self.faces]
-        longest = ((np.roll(corners, -1, axis=1) - corners) ** 2).sum(axis=2).max(axis=1)
-        crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        flat: BoolArray = np.linalg.norm(crosses, axis=1) / 2 <= FLAT * longest
-        return flat
-
     def used(self) -> BoolArray:
         """Which present vertices some face uses; those that were joined with another count as used."""
         used = np.zeros(len(self.vertices), dtype=bool)
@@ -220,7 +213,7 @@ class _Work:
     def collapse(self) -> None:
         total = 0
         for _ in range(5):
-            count = self._join(collapsed(self.vertices, self.faces, self._flat()))
+            count = self._join(collapsed(self.vertices, self.faces, flat_faces(Mesh(self.vertices, self.faces))))
             if not count:
                 break
             total += count
