@@ -16,7 +16,9 @@ from csm.data.prepare import Recipe, shared_operators
 from csm.data.store import Store
 from csm.descriptors.constant import Constant
 from csm.errors import ConfigError
+from csm.matching.embedded import Embedded, n_eigenfunctions
 from csm.matching.maps import VertexMap
+from csm.mesh.debris import unit_area
 from csm.mesh.shape import Mesh
 from csm.operators import Spectrum
 
@@ -134,6 +136,12 @@ class Described:
         """Return the first `k` Laplace-Beltrami eigenpairs of the mesh at unit area."""
         store = self.store or Store()
         return shared_operators(self.mesh, [Recipe(Constant(), k)], store).lbo(k)
+
+    @cached_property
+    def embedded(self) -> Embedded:
+        """The mesh at unit area with its eigenfunctions, as refinements compute with them."""
+        spectrum = self.spectrum(n_eigenfunctions(self.mesh))
+        return Embedded(unit_area(self.mesh), spectrum, self.features.device)
 
 
 class Matcher(ABC):

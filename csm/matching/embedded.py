@@ -1,0 +1,147 @@
+"""A shape as refinements see it: its Laplace-Beltrami eigenfunctions, at all vertices and at samples of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import torch
+from scipy.spatial import cKDTree
+from torch import Tensor
+
+from csm._types import FloatArray, IntArray
+from csm.matching.orientation import spectral_turns
+from csm.mesh.shape import Mesh
+from csm.operators.spectrum import Spectrum
+
+MOST = 200
+"""Eigenfunctions that refinements use at most."""
+
+CROSSED = 8
+"""Eigenfunctions whose gradients are crossed, which tells a map from its mirror image."""
+
+_SMOOTH = 60  # eigenfunctions that these crossed gradients are projected on
+
+
+def n_eigenfunctions(mesh: Mesh) -> int:
+    """Return how many eigenfunctions refinements use of a mesh: 200, or a fifth of its vertices if that is less.
+
+    Examples
+    --------
+    >>> import csm
+    >>> n_eigenfunctions(csm.load_humans().mesh("s00_p00"))
+    200
+    """
+    return max(min(MOST, mesh.n_vertices // 5), min(mesh.n_vertices, CROSSED + 2))
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Vertices spread evenly over a shape.
+
+    Parameters
+    ----------
+    at
+        Shape (p,): the vertices.
+    areas
+        Shape (p,): area of the vertices that are nearest to each sample; they sum to the area of the shape.
+    evecs
+        Shape (p, K), float32.
+    turns
+        Shape (p, k, k), float32: n . (grad phi_i x grad phi_j) of the first k eigenfunctions, see
+        `csm.matching.orientation`.
+    """
+
+    at: IntArray
+    areas: Tensor
+    evecs: Tensor
+    turns: Tensor
+
+    def __len__(self) -> int:
+        return len(self.at)
+
+
+class Embedded:
+    """A mesh with its eigenfunctions, in the form that refinements compute with.
+
+    Parameters
+    ----------
+    mesh
+        The shape at unit area.
+    spectrum
+        Its K eigenpairs.
+    device
+        Where the tensors are.
+    """
+
+    def __init__(self, mesh: Mesh, spectrum: Spectrum, device: str | torch.device = "cpu") -> None:
+        self.mesh, self.spectrum, self.device = mesh, spectrum, device
+        self._samples: dict[int, Samples] = {}
+
+    @property
+    def k(self) -> int:
+        """K, the number of eigenfunctions."""
+        return len(self.spectrum.evals)
+
+    @cached_property
+    def evecs(self) -> Tensor:
+        """Shape (N, K), float32."""
+        return self._tensor(self.spectrum.evecs)
+
+    @cached_property
+    def evals(self) -> Tensor:
+        """Shape (K,), float32."""
+        return self._tensor(self.spectrum.evals)
+
+    @cached_property
+    def areas(self) -> Tensor:
+        """Vertex areas, shape (N,), float32."""
+        return self._tensor(self.spectrum.mass)
+
+    @cached_property
+    def _turns(self) -> FloatArray:
+        return spectral_turns(self.mesh, self.spectrum, min(CROSSED, self.k), min(_SMOOTH, self.k))
+
+    def samples(self, n: int) -> Samples:
+        """Return `n` samples, or all vertices that have an area if these are fewer."""
+        if n not in self._samples:
+            usable = np.flatnonzero(self.spectrum.mass > 0)
+            at = usable[farthest_points(self.mesh.vertices[usable], n)]
+            owner = cKDTree(self.mesh.vertices[at]).query(self.mesh.vertices[usable])[1]
+            areas = np.bincount(owner, self.spectrum.mass[usable], minlength=len(at))
+            self._samples[n] = Samples(at, self._tensor(areas), self.evecs[at], self._tensor(self._turns[at]))
+        return self._samples[n]
+
+    def _tensor(self, values: FloatArray) -> Tensor:
+        return torch.from_numpy(np.ascontiguousarray(values, dtype=np.float32)).to(self.device)
+
+
+def farthest_points(points: FloatArray, n: int) -> IntArray:
+    """Return the numbers of `n` points, each the farthest (Euclidean) from those before it.
+
+    The first is the farthest from the mean, so nothing is random.
+
+    Parameters
+    ----------
+    points
+        Shape (N, 3).
+    n
+        All points are returned, in their order, if there are not more.
+
+    Examples
+    --------
+    >>> farthest_points(np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [9, 0, 0]]), 2)
+    array([3, 0])
+    """
+    if len(points) <= n:
+        return np.arange(len(points))
+    chosen = np.empty(n, dtype=np.int64)
+    distance = np.full(len(points), np.inf)
+    at = int(((points - points.mean(0)) ** 2).sum(1).argmax())
+    for i in range(n):
+        chosen[i] = at
+        rest = points - points[at]
+        np.minimum(distance, np.einsum("ij,ij->i", rest, rest), out=distance)
+        at = int(distance.argmax())
+    return chosen

@@ -1,0 +1,81 @@
+"""The base class of the refiners, and a matcher followed by one."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar
+
+from csm._types import IntArray
+from csm.matching.base import Described, Matcher
+from csm.matching.functional import FunctionalMap
+from csm.matching.maps import VertexMap
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedMap:
+    """What a refiner makes of a start.
+
+    Parameters
+    ----------
+    forward
+        The map source -> target.
+    backward
+        The map target -> source that belongs to it; None if the refiner makes none.
+    functional
+        The functional map of `forward`; None where there is none.
+    text
+        What was done, in words, with its figures.
+    """
+
+    forward: VertexMap
+    backward: VertexMap | None = None
+    functional: FunctionalMap | None = None
+    text: str = ""
+
+
+class Refiner(ABC):
+    """A rule that makes a better map of one; its fields are its parameters.
+
+    A refiner is a frozen dataclass.  It is added to csm by one file here and one line in
+    `csm.matching.refinement.registry`.
+    """
+
+    name: ClassVar[str]
+
+    @abstractmethod
+    def __call__(self, start: VertexMap, source: Described, target: Described) -> RefinedMap:
+        """Refine a map source -> target that has an entry for every vertex of the source."""
+
+    def parameters(self) -> dict[str, Any]:
+        """Return every parameter as plain data: with `name`, all that a cache key needs."""
+        return asdict(self)  # type: ignore[call-overload,no-any-return]
+
+
+@dataclass(frozen=True)
+class Refined(Matcher):
+    """A matcher followed by a refiner: a matcher again, named after both.
+
+    Examples
+    --------
+    >>> from csm.matching import matcher
+    >>> from csm.matching.refinement import refiner
+    >>> Refined(matcher("nearest"), refiner("joint")).name
+    'nearest+joint'
+    """
+
+    matcher: Matcher
+    refiner: Refiner
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        """Names of both, with a plus sign between them."""
+        return f"{self.matcher.name}+{self.refiner.name}"
+
+    def __call__(self, source: Described, target: Described, at: IntArray | None = None) -> VertexMap:
+        """Return the refined map, of all vertices whatever is asked for: a refinement needs all of them."""
+        return self.refiner(self.matcher(source, target), source, target).forward
+
+    def parameters(self) -> dict[str, Any]:
+        """Return the parameters of both."""
+        return {**self.matcher.parameters(), "refiner": {"name": self.refiner.name, **self.refiner.parameters()}}

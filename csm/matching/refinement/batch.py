@@ -1,0 +1,127 @@
+"""Many functional maps at once, at samples of the shapes: a step of refinement, and how good each of them is.
+
+B matrices (B, K, K) take coefficients on the target to coefficients on the source, as everywhere in csm; B maps (B, p)
+give for each of p samples of the source the number of a sample of the target.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from csm.matching.embedded import Samples
+from csm.matching.refinement.pair import SampledPair
+
+_BLOCK = 4096  # queries that are compared with all candidates at a time
+
+
+def nearest_rows(queries: Tensor, candidates: Tensor) -> Tensor:
+    """Return the numbers of the nearest candidates (q, D) of queries (..., D), in float32 products."""
+    rows = queries.reshape(-1, queries.shape[-1])
+    half_norms = 0.5 * candidates.square().sum(1)
+    found = torch.empty(len(rows), dtype=torch.int64, device=rows.device)
+    for begin in range(0, len(rows), _BLOCK):
+        part = rows[begin : begin + _BLOCK]
+        found[begin : begin + _BLOCK] = torch.addmm(half_norms, part, candidates.T, alpha=-1.0).argmin(1)
+    return found.reshape(queries.shape[:-1])
+
+
+def matrices_of(maps: Tensor, pair: SampledPair, k: int) -> Tensor:
+    """Return the functional maps (B, k, k) of maps (B, p): least squares over the samples, weighted by their areas."""
+    phi = pair.source.evecs[:, :k].double()
+    weighted = phi * pair.source.areas[:, None]
+    inverse = torch.linalg.solve(weighted.T @ phi, weighted.T).float()
+    return torch.einsum("kp,bpl->bkl", inverse, pair.target.evecs[:, :k][maps])
+
+
+def orthogonal(matrices: Tensor) -> Tensor:
+    """Return the nearest orthogonal matrices (B, k, k)."""
+    u, _, v = torch.linalg.svd(matrices)
+    return u @ v
+
+
+@dataclass(frozen=True)
+class Guides:
+    """What steers a step beside the eigenfunctions.
+
+    Parameters
+    ----------
+    descriptor
+        Weight of the features, whose total variance is 1 like that of the eigenfunctions.
+    orientation
+        Weight of the pseudo-scalars n . (grad phi_i x grad phi_j), which keeps maps from being mirrored.
+    """
+
+    descriptor: float
+    orientation: float
+
+
+def step(matrices: Tensor, pair: SampledPair, guides: Guides) -> Tensor:
+    """Return the maps (B, p) of functional maps (B, k, k), made orthogonal first.
+
+    Each sample goes to the nearest in [pulled-back eigenfunctions, features, pulled-back pseudo-scalars].
+    """
+    k = matrices.shape[-1]
+    matrices = orthogonal(matrices)
+    queries = [torch.einsum("pk,bkl->bpl", pair.source.evecs[:, :k], matrices) / k**0.5]
+    candidates = [pair.target.evecs[:, :k] / k**0.5]
+    if guides.orientation > 0:
+        turned, turns = _turns(matrices, pair.source, pair.target)
+        queries.append(guides.orientation * turned)
+        candidates.append(guides.orientation * turns)
+    if guides.descriptor > 0:
+        queries.append((guides.descriptor * pair.features_source).expand(len(matrices), -1, -1))
+        candidates.append(guides.descriptor * pair.features_target)
+    return nearest_rows(torch.cat(queries, -1), torch.cat(candidates, -1))
+
+
+def _turns(matrices: Tensor, source: Samples, target: Samples) -> tuple[Tensor, Tensor]:
+    """Return the pseudo-scalars of the pulled-back functions, (B, p, J), and of the target's own, (q, J), scaled."""
+    k = min(matrices.shape[-1], source.turns.shape[-1], target.turns.shape[-1])
+    i, j = torch.triu_indices(k, k, 1, device=matrices.device)
+    turns = target.turns[:, i, j]
+    low = matrices[:, :k, :k]
+    half = torch.einsum("bai,pac->bpic", low, source.turns[:, :k, :k])
+    turned = torch.einsum("bpic,bcj->bpij", half, low)[:, :, i, j]
+    size = (turns.square() * target.areas[:, None]).sum().sqrt()
+    size = torch.where(size > 0, size, torch.ones_like(size))
+    return turned / size, turns / size
+
+
+@dataclass(frozen=True, eq=False)
+class Scores:
+    """What is known of B maps without ground truth, shape (B,) each; less is better.
+
+    Parameters
+    ----------
+    stretch
+        |C^T C - 1| / sqrt(K) of the functional map: areas are not kept.
+    commutation
+        |C Lambda_t - Lambda_s C| over the size of the eigenvalues: lengths are not kept.
+    descriptor
+        Root of the mean squared distance of the features, whose total variance is 1.
+    """
+
+    stretch: Tensor
+    commutation: Tensor
+    descriptor: Tensor
+
+    @property
+    def total(self) -> Tensor:
+        """Their sum, by which maps are chosen."""
+        return self.stretch + self.commutation + self.descriptor
+
+
+def scores(maps: Tensor, pair: SampledPair, k: int) -> Scores:
+    """Judge maps (B, p) by their functional maps of k x k and by the features."""
+    matrices = matrices_of(maps, pair, k)
+    here, there = pair.pair.source.evals[:k], pair.pair.target.evals[:k]
+    unit = torch.eye(k, device=maps.device)
+    stretch = (matrices.transpose(1, 2) @ matrices - unit).flatten(1).norm(dim=1) / k**0.5
+    gaps = matrices * there - here[:, None] * matrices
+    size = (here.norm() * there.norm()).sqrt()
+    apart = (pair.features_source - pair.features_target[maps]).square().sum(-1)
+    areas = pair.source.areas / pair.source.areas.sum()
+    return Scores(stretch, gaps.flatten(1).norm(dim=1) / size, (apart @ areas).sqrt())

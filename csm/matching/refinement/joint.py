@@ -1,0 +1,182 @@
+"""Joint refinement: ZoomOut's climb to finer functional maps, with the descriptor in every step.
+
+ZoomOut (Melzi et al., "ZoomOut: Spectral Upsampling for Efficient Shape Correspondence", 2019) goes to and fro between
+a functional map of K x K and a vertex map with growing K.  Two things are done here that it does not: the nearest
+neighbour is taken in [eigenfunctions, descriptor], so that the precision of the descriptor is kept, and the functional
+map is made orthogonal, as that of a map that keeps areas is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from csm._types import FloatArray, IntArray
+from csm.errors import ConfigError
+from csm.matching.base import Described
+from csm.matching.functional import FunctionalMap
+from csm.matching.maps import VertexMap
+from csm.matching.nearest import nearest
+from csm.matching.refinement.base import RefinedMap, Refiner
+from csm.matching.refinement.batch import nearest_rows, orthogonal
+from csm.matching.refinement.pair import Pair
+
+SCHEDULE = (30, 40, 60, 100, 150, 200)
+"""Sizes of the functional maps, one after the other."""
+
+
+@dataclass(frozen=True)
+class Climb:
+    """How a functional map becomes finer.
+
+    Parameters
+    ----------
+    schedule
+        Sizes K in order; those beyond the eigenfunctions of a shape are left out.
+    weight
+        Of the descriptor against the eigenfunctions; both have a total variance of 1.
+    orthogonal
+        Whether the functional map is made orthogonal at each size.
+    samples
+        Vertices of the source that all sizes but the last are computed on.
+    candidates
+        Vertices of the target that they can go to in all sizes but the last.
+
+    Raises
+    ------
+    ConfigError
+        If a parameter is out of its range.
+    """
+
+    schedule: tuple[int, ...] = SCHEDULE
+    weight: float = 1.0
+    orthogonal: bool = True
+    samples: int = 2500
+    candidates: int = 10000
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "schedule", tuple(self.schedule))
+        if not self.schedule or min(self.schedule) < 2 or list(self.schedule) != sorted(self.schedule):
+            raise ConfigError(f"{self.schedule}: wanted a schedule of ascending sizes from 2")
+        if not self.weight >= 0 or self.samples < 10 or self.candidates < 10:
+            raise ConfigError(f"{self}: wanted weight >= 0, samples >= 10 and candidates >= 10")
+
+    def sizes(self, k: int) -> list[int]:
+        """Return the sizes that `k` eigenfunctions allow, at least one."""
+        return [size for size in self.schedule if size <= k] or [k]
+
+    def __call__(self, matrix: Tensor, pair: Pair) -> Tensor:
+        """Climb from a functional map of the first size, (K, K), to one of the last; return that."""
+        sizes = self.sizes(pair.k)
+        s = pair.source.samples(self.samples)
+        n = pair.target.mesh.n_vertices
+        there = np.arange(n) if n <= self.candidates else pair.target.samples(self.candidates).at
+        here, found = s.at, torch.from_numpy(there).to(matrix.device)
+        for i in range(len(sizes) - 1):
+            queries, candidates = self.rows(matrix, pair)
+            at = found[nearest_rows(queries[here], candidates[there])]
+            matrix = least_squares(pair, here, at, s.areas, sizes[i + 1])
+        return matrix
+
+    def rows(self, matrix: Tensor, pair: Pair) -> tuple[Tensor, Tensor]:
+        """Return what vertices of the source and of the target are compared by, under a functional map (K, K)."""
+        if self.orthogonal:
+            matrix = orthogonal(matrix)
+        k = matrix.shape[-1]
+        here = pair.source.evecs[:, :k] @ (matrix / k**0.5)
+        there = pair.target.evecs[:, :k] / k**0.5
+        if self.weight == 0:
+            return here, there
+        return (
+            torch.cat([here, self.weight * pair.features_source], 1),
+            torch.cat([there, self.weight * pair.features_target], 1),
+        )
+
+
+def least_squares(pair: Pair, here: IntArray, there: Tensor, areas: Tensor, k: int) -> Tensor:
+    """Return the functional map (k, k) of a map from vertices `here` of the source to vertices `there` of the target."""
+    phi, psi = pair.source.evecs[here, :k].double(), pair.target.evecs[there, :k].double()
+    weighted = phi * areas[:, None].double()
+    return torch.linalg.solve(weighted.T @ phi, weighted.T @ psi).float()
+
+
+def both_ways(matrix: Tensor, pair: Pair, climb: Climb) -> tuple[IntArray, IntArray]:
+    """Return the maps source -> target and target -> source of one functional map, at all vertices."""
+    here, there = climb.rows(matrix, pair)
+    return nearest(here, there), nearest(there, here)
+
+
+@dataclass(frozen=True)
+class Joint(Refiner):
+    """Refine one start by functional maps of growing size, with the descriptor in every step.
+
+    Parameters
+    ----------
+    schedule
+        Sizes of the functional maps, ascending.
+    weight
+        Of the descriptor against the eigenfunctions; 0 leaves it out.
+    orthogonal
+        Whether the functional maps are made orthogonal.
+
+    Raises
+    ------
+    ConfigError
+        If a parameter is out of its range.
+
+    Examples
+    --------
+    >>> Joint(weight=0.5).parameters()["weight"]
+    0.5
+    """
+
+    schedule: tuple[int, ...] = SCHEDULE
+    weight: float = 1.0
+    orthogonal: bool = True
+
+    name: ClassVar[str] = "joint"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "schedule", self.climb.schedule)
+
+    @property
+    def climb(self) -> Climb:
+        """The same as a `Climb`."""
+        return Climb(self.schedule, self.weight, self.orthogonal)
+
+    def __call__(self, start: VertexMap, source: Described, target: Described) -> RefinedMap:
+        """Return the refined map."""
+        pair = Pair.of(source, target)
+        matrix = first_matrix(start.indices, pair, self.climb.sizes(pair.k)[0])
+        return finished(self.climb(matrix, pair), pair, self.climb, start, _text(self.climb.sizes(pair.k)))
+
+
+def first_matrix(indices: IntArray, pair: Pair, k: int) -> Tensor:
+    """Return the functional map (k, k) of a map from all vertices of the source."""
+    here = np.flatnonzero(indices >= 0)
+    there = torch.from_numpy(indices[here]).to(pair.source.device)
+    return least_squares(pair, here, there, pair.source.areas[here], k)
+
+
+def finished(matrix: Tensor, pair: Pair, climb: Climb, start: VertexMap, text: str) -> RefinedMap:
+    """Return the maps of the last functional map of a climb."""
+    forward, backward = both_ways(matrix, pair, climb)
+    if climb.orthogonal:
+        matrix = orthogonal(matrix)
+    c: FloatArray = matrix.double().cpu().numpy()
+    source, target = start.source, start.target
+    return RefinedMap(
+        VertexMap(forward, pair.target.mesh.n_vertices, source, target),
+        VertexMap(backward, pair.source.mesh.n_vertices, target, source),
+        FunctionalMap(c, source, target),
+        text,
+    )
+
+
+def _text(sizes: Sequence[int]) -> str:
+    return f"refined jointly with the descriptor in {len(sizes)} steps, to functional maps of {sizes[-1]} functions"

@@ -1,0 +1,119 @@
+"""Several starts and a choice: the maps that the eigenfunctions' signs allow, refined, and the best of them.
+
+A map between two poses is nearly perfect or has limbs exchanged: which of the two is decided by the start.  In the first
+K eigenfunctions the map of a pair of similar bodies is close to diagonal, so only the signs are open (Ren et al.,
+"MapTree: Recovering Multiple Solutions in the Space of Maps", 2020).  So every choice of the first signs is a start,
+alone and applied to the functional map of the descriptor's nearest neighbours.  All are refined together at some
+hundred samples, guided by the descriptor and, against mirrored maps, by the orientation of the surfaces
+(`csm.matching.orientation`); the one that keeps areas, lengths and the descriptor best (`Scores.total`) then climbs to
+all vertices.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import ClassVar
+
+import torch
+from torch import Tensor
+
+from csm.errors import ConfigError
+from csm.matching.base import Described
+from csm.matching.maps import VertexMap
+from csm.matching.refinement.base import RefinedMap, Refiner
+from csm.matching.refinement.batch import Guides, matrices_of, orthogonal, scores, step
+from csm.matching.refinement.joint import SCHEDULE, Climb, finished, first_matrix
+from csm.matching.refinement.pair import Pair, SampledPair
+
+_SEARCH = (8, 10, 12, 15, 18, 22, 26, 30, 30)  # sizes of the functional maps of the search
+_UNGUIDED = 3  # of these steps, the last ones, which the orientation does not guide
+
+
+@dataclass(frozen=True)
+class Multistart(Refiner):
+    """Refine many starts at samples, choose the best, and refine it at all vertices.
+
+    Parameters
+    ----------
+    signs
+        How many of the first eigenfunctions have each sign in turn (the first is constant and has one): 2^(signs - 1)
+        choices.
+    samples
+        Vertices of each shape that starts are refined at.
+    descriptor, orientation
+        Weights of the descriptor and of the pseudo-scalars against the eigenfunctions in the search.
+    schedule, weight
+        Of the climb, see `csm.matching.refinement.joint.Joint`.
+
+    Raises
+    ------
+    ConfigError
+        If a parameter is out of its range.
+
+    Examples
+    --------
+    >>> Multistart().name
+    'multistart'
+    """
+
+    signs: int = 6
+    samples: int = 500
+    descriptor: float = 1.0
+    orientation: float = 2.0
+    schedule: tuple[int, ...] = SCHEDULE
+    weight: float = 1.0
+
+    name: ClassVar[str] = "multistart"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "schedule", self.climb.schedule)
+        if not 1 <= self.signs <= _SEARCH[0] or self.samples < 10:
+            raise ConfigError(f"{self}: wanted signs from 1 to {_SEARCH[0]} and samples >= 10")
+        if not (self.descriptor >= 0 and self.orientation >= 0):
+            raise ConfigError(f"{self}: wanted weights of at least 0")
+
+    @property
+    def climb(self) -> Climb:
+        """How the chosen start becomes finer."""
+        return Climb(self.schedule, self.weight)
+
+    def __call__(self, start: VertexMap, source: Described, target: Described) -> RefinedMap:
+        """Return the refined map of the best start."""
+        pair = Pair.of(source, target)
+        matrix, text = self.search(start, pair)
+        return finished(self.climb(matrix, pair), pair, self.climb, start, text)
+
+    def search(self, start: VertexMap, pair: Pair) -> tuple[Tensor, str]:
+        """Return the functional map of the best start, (K, K) for the first K of the schedule, and what was done."""
+        sampled = pair.sampled(self.samples)
+        largest = min(pair.k, len(sampled.source), len(sampled.target))
+        sizes = [size for size in _SEARCH if size <= largest] or [largest]
+        matrices = self.starts(first_matrix(start.indices, pair, sizes[0]))
+        maps = self._refine(matrices, sampled, sizes)
+        judged = scores(maps, sampled, sizes[-1])
+        best = int(judged.total.argmin())
+        k = min(self.climb.sizes(pair.k)[0], largest)
+        text = (
+            f"the best of {len(matrices)} starts (stretch {float(judged.stretch[best]):.2f}, commutation "
+            f"{float(judged.commutation[best]):.2f}, descriptor {float(judged.descriptor[best]):.2f}), refined jointly "
+            f"with the descriptor to functional maps of {self.climb.sizes(pair.k)[-1]} functions"
+        )
+        return matrices_of(maps[best : best + 1], sampled, k)[0], text
+
+    def starts(self, matrix: Tensor) -> Tensor:
+        """Return the functional maps (B, K, K) to begin with, made of that of a start, (K, K)."""
+        k = len(matrix)
+        flips = torch.ones(2 ** (min(self.signs, k) - 1), k, device=matrix.device)
+        for row, chosen in enumerate(product((1.0, -1.0), repeat=min(self.signs, k) - 1)):
+            flips[row, 1 : 1 + len(chosen)] = torch.tensor(chosen)
+        flipped = flips[:, :, None]
+        return torch.cat([flipped * torch.eye(k, device=matrix.device), flipped * orthogonal(matrix), matrix[None]])
+
+    def _refine(self, matrices: Tensor, sampled: SampledPair, sizes: list[int]) -> Tensor:
+        guided, free = Guides(self.descriptor, self.orientation), Guides(self.descriptor, 0.0)
+        maps = step(matrices, sampled, guided)
+        for i, size in enumerate(sizes):
+            guides = guided if i < max(1, len(sizes) - _UNGUIDED) else free
+            maps = step(matrices_of(maps, sampled, size), sampled, guides)
+        return maps
