@@ -12,7 +12,7 @@ import csm
 from csm.errors import CsmError
 from tests.shapes import blob
 
-ODD = [None, 3, np.zeros((4, 3)), [1, 2], {"a": 1}, trimesh.creation.box()]
+ODD = [None, 3, np.zeros((4, 3)), [1, 2], {"a": 1}, trimesh.Scene([trimesh.creation.box()] * 2)]
 
 
 @pytest.mark.parametrize("odd", ODD, ids=lambda odd: type(odd).__name__)

@@ -16,8 +16,9 @@ from csm.matching.maps import VertexMap
 from csm.matching.methods import Method, PrecomputedMethod, as_method
 from csm.matching.nearest import Rows, nearest
 from csm.matching.registry import matcher as as_matcher
-from csm.matching.subjects import Cleaning, MeshLike, Subject, on_given_vertices, subject_of
+from csm.matching.subjects import Cleaning, Subject, on_given_vertices, subject_of
 from csm.mesh.debris import body_of
+from csm.mesh.inputs import MeshLike
 from csm.mesh.shape import Mesh
 from csm.mesh.topology import rim
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from typing import Literal, TypeAlias, get_args
 
@@ -13,11 +12,10 @@ from csm.errors import ConfigError
 from csm.matching.maps import VertexMap
 from csm.mesh.check import Finding, check
 from csm.mesh.clean import Cleaned, clean
-from csm.mesh.io import read_polygons
+from csm.mesh.inputs import MeshLike, as_polygons
 from csm.mesh.polygons import PolygonMesh, triangulated
 from csm.mesh.shape import Mesh
 
-MeshLike: TypeAlias = Mesh | PolygonMesh | str | os.PathLike[str]
 Cleaning: TypeAlias = Literal["auto", "off"]
 
 _MENDED = {
@@ -58,10 +56,19 @@ class Subject:
         return (*said, *([remaining] if remaining else []))
 
 
-def subject_of(mesh: MeshLike, cleaning: Cleaning = "auto") -> Subject:
+def subject_of(mesh: MeshLike, cleaning: Cleaning = "auto", name: str = "mesh") -> Subject:
     """Read a mesh if it is a file, check it, and clean it unless cleaning is "off".
 
     Debris and vertices in no face are left out of the computation in either case.
+
+    Parameters
+    ----------
+    mesh
+        What `csm.mesh.inputs.as_mesh` takes, also with polygons.
+    cleaning
+        Whether to mend a copy for the computation.
+    name
+        What a mesh is called that has no name of its own.
 
     Raises
     ------
@@ -73,7 +80,7 @@ def subject_of(mesh: MeshLike, cleaning: Cleaning = "auto") -> Subject:
     if not isinstance(cleaning, str) or cleaning not in get_args(Cleaning):
         shown = cleaning if isinstance(cleaning, str) else f"a {type(cleaning).__name__}"
         raise ConfigError(f"clean={shown}; wanted {' or '.join(get_args(Cleaning))}")
-    polygons = _read(mesh)
+    polygons = as_polygons(mesh, name)
     if isinstance(polygons, PolygonMesh) and (cleaning == "off" or polygons.all_triangles):
         polygons = polygons.triangles()
     given = polygons if isinstance(polygons, Mesh) else triangulated(polygons).mesh
@@ -84,17 +91,6 @@ def subject_of(mesh: MeshLike, cleaning: Cleaning = "auto") -> Subject:
         left = {finding.kind for finding in check(cleaned.mesh)}
         findings = tuple(finding for finding in findings if finding.kind in left)
     return Subject(given, cleaned, findings)
-
-
-def _read(mesh: MeshLike) -> Mesh | PolygonMesh:
-    if isinstance(mesh, Mesh | PolygonMesh):
-        return mesh
-    if isinstance(mesh, str | os.PathLike):
-        return read_polygons(mesh)
-    raise ConfigError(
-        f"a mesh is a file or what csm.read_mesh returns, got a {type(mesh).__name__}; for arrays there is "
-        "csm.Mesh(vertices, faces)"
-    )
 
 
 def on_given_vertices(found: VertexMap, source: Subject, target: Subject) -> VertexMap:

@@ -88,7 +88,7 @@ def test_a_map_between_cleaned_meshes_becomes_one_between_the_given():
 
 
 def test_what_is_no_mesh_or_no_way_of_cleaning_is_named(tmp_path):
-    with pytest.raises(ConfigError, match=r"got a ndarray; for arrays there is csm\.Mesh"):
+    with pytest.raises(ConfigError, match=r"got an array of shape \(3, 3\) alone; give both"):
         subject_of(np.zeros((3, 3)))
     with pytest.raises(ConfigError, match="clean=full; wanted auto or off"):
         subject_of(blob(2), "full")
