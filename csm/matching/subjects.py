@@ -9,7 +9,9 @@ import numpy as np
 
 from csm._types import IntArray
 from csm.errors import ConfigError
+from csm.matching.barycentric import BarycentricMap
 from csm.matching.maps import VertexMap
+from csm.matching.way import Way
 from csm.mesh.check import Finding, check
 from csm.mesh.clean import Cleaned, clean
 from csm.mesh.inputs import MeshLike, as_polygons
@@ -99,3 +101,35 @@ def on_given_vertices(found: VertexMap, source: Subject, target: Subject) -> Ver
     mapped = np.where(at >= 0, found.indices[at], -1)
     indices: IntArray = np.where(mapped >= 0, target.cleaned.origin[mapped], -1)
     return VertexMap(indices, target.given.n_vertices, source.given.name, target.given.name)
+
+
+def on_given_faces(found: BarycentricMap, source: Subject, target: Subject) -> BarycentricMap:
+    """Return a map into faces between the cleaned meshes as one between the given ones; -1 as in `on_given_vertices`.
+
+    A face of the cleaned target is one of the given mesh between the same places, perhaps turned or with corners that
+    were welded; where the given mesh has several such, the first.
+    """
+    at, given = source.cleaned.vertex_map, target.given
+    names = (source.given.name, target.given.name)
+    mapped = np.where(at >= 0, found.faces[at], -1)
+    places = np.where(target.cleaned.vertex_map >= 0, target.cleaned.origin[target.cleaned.vertex_map], -1)
+    corners = places[given.faces]
+    wanted = np.where(mapped[:, None] >= 0, target.cleaned.origin[found.target_faces[mapped]], -1)
+    faces = _rows_of(np.sort(wanted, axis=1), np.sort(corners, axis=1))
+    faces[mapped < 0] = -1
+    same = corners[faces][:, :, None] == wanted[:, None, :]  # corner of the given face, corner of the cleaned one
+    weights = np.einsum("nij,nj->ni", same, np.where(at[:, None] >= 0, found.weights[at], 0.0))
+    return BarycentricMap(faces, weights, given.faces, given.n_vertices, *names)
+
+
+def _rows_of(wanted: IntArray, rows: IntArray) -> IntArray:
+    """Return where each wanted row is among some rows, the first of equal ones; -1 where it is not."""
+    _, first, which = np.unique(np.concatenate([rows, wanted]), axis=0, return_index=True, return_inverse=True)
+    found: IntArray = first[which.ravel()[len(rows) :]]
+    return np.where(found < len(rows), found, -1)
+
+
+def on_given(found: Way, source: Subject, target: Subject) -> Way:
+    """Return one way between the cleaned meshes as one between the given ones; a functional map stays as it is."""
+    precise = None if found.barycentric is None else on_given_faces(found.barycentric, source, target)
+    return Way(on_given_vertices(found.vertex_map, source, target), precise, found.functional_map)

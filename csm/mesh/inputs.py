@@ -88,8 +88,8 @@ def _in_words(thing: object) -> str:
     kind = type(thing).__name__
     if hasattr(thing, "geometry"):
         return (
-            f"a {kind}, which may hold several meshes; take one of them (scene.geometry has them by name), or join them "
-            "(scene.to_mesh() in trimesh)"
+            f"a {kind}, which may hold several meshes; take one of them (scene.geometry has them by name), or join "
+            "them (scene.to_mesh() in trimesh)"
         )
     if hasattr(thing, "vertices"):
         return f"a {kind}, which has vertices but no faces; csm works on surfaces, so reconstruct one first"

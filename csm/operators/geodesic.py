@@ -60,7 +60,8 @@ def geodesics(mesh: MeshLike, method: Method = "exact") -> Geodesics:
     Parameters
     ----------
     mesh
-        N vertices, in any way that `csm.mesh.inputs.as_mesh` takes.  A vertex of no face is infinitely far from all others.
+        N vertices, in any way that `csm.mesh.inputs.as_mesh` takes.  A vertex of no face is infinitely far from all
+        others.
     method
         "exact": the polyhedral metric, by window propagation (Mitchell, Mount, Papadimitriou, SIAM J. Comput. 16, 1987;
         Surazhsky et al., SIGGRAPH 2005) in pygeodesic; propagation stops at the last target, so a pair a few edges
@@ -100,6 +101,9 @@ class _OnMesh:
         self.graph = edge_graph(self.vertices, self.faces)
         self.component = components(*half_edges(self.faces), len(self.used))
         self._prepare()
+
+    def __repr__(self) -> str:
+        return f"Geodesics({self.mesh!r}, {self.method})"
 
     def rows(self, sources: IntArray) -> FloatArray:
         sources = self._checked(sources)

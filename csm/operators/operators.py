@@ -110,6 +110,9 @@ class Operators:
         self._anisotropic: dict[tuple[FrameKind, int, float], AnisotropicStiffness] = {}
         self._spectra: dict[tuple[str, tuple[tuple[str, Any], ...]], Spectrum] = {}
 
+    def __repr__(self) -> str:
+        return f"Operators({self.mesh!r})"
+
     def parts(self) -> Iterator[OperatorsOfBody]:
         """Yield the operators of each component of the body by itself, at the scale of the whole."""
         label = component_areas(self.mesh)[0]
