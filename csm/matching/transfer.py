@@ -187,7 +187,7 @@ def push_landmarks(landmarks: ArrayLike, back: VertexMap | None, along: Barycent
     given = np.asarray(landmarks)
     if back is None:
         raise ConfigError(f"landmarks of {along.target} need the map {along.target} -> {along.source}: give back=")
-    wrong = given.ndim != 1 or given.dtype.kind not in "iu"
+    wrong = given.ndim != 1 or (given.size > 0 and given.dtype.kind not in "iu")
     if wrong or given.min(initial=0) < 0 or given.max(initial=-1) >= len(back):
         raise DataError(
             f"{along.target}: landmarks are {given.dtype} of shape {given.shape}; wanted a list of its vertices, "

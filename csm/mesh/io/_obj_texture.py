@@ -9,7 +9,7 @@ import numpy as np
 
 from csm._types import FloatArray, IntArray
 from csm.errors import MeshError
-from csm.mesh.io.raw import coordinates, decode
+from csm.mesh.io.raw import decode, is_number
 from csm.mesh.textured import Textured
 
 _OPTIONS = {"-blendu": 1, "-blendv": 1, "-cc": 1, "-clamp": 1, "-texres": 1, "-imfchan": 1, "-boost": 1, "-bm": 1}
@@ -46,7 +46,7 @@ def parse_obj_texture(data: bytes) -> ObjTexture:
         if not words:
             continue
         if words[0] == "vt":
-            rows.append([*words[1:3], *["0"] * (4 - len(words)), "0"][:3])
+            rows.append([*words[1:3], "0"][:2])
         elif words[0] == "f":
             corners += [_place(word, len(rows), len(materials)) for word in words[1:]]
             materials.append(material)
@@ -54,11 +54,18 @@ def parse_obj_texture(data: bytes) -> ObjTexture:
             material = " ".join(words[1:])
         elif words[0] == "mtllib":
             libraries.append(line.split(None, 1)[1].strip())
-    places = np.vstack([coordinates(rows)[:, :2], [[np.nan, np.nan]]])
+    places = np.vstack([_numbers(rows), [[np.nan, np.nan]]])
     numbers = np.array(corners, dtype=np.int64)
     if numbers.max(initial=-1) >= len(rows):
         raise MeshError(f"a face refers to texture coordinates {numbers.max() + 1}, but there are {len(rows)}")
     return ObjTexture(places[numbers], materials, libraries)
+
+
+def _numbers(rows: list[list[str]]) -> FloatArray:
+    wrong = next((i for i, row in enumerate(rows) if len(row) < 2 or not all(map(is_number, row))), None)
+    if wrong is not None:
+        raise MeshError(f"texture coordinates {wrong} are {' '.join(rows[wrong])[:80]!r}, wanted two numbers")
+    return np.array(rows, dtype=np.float64).reshape(len(rows), 2)
 
 
 def _place(word: str, n_so_far: int, face: int) -> int:
