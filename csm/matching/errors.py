@@ -64,6 +64,19 @@ def map_errors(
     """
     if normaliser not in ("diameter", "sqrt_area"):
         raise ConfigError(f"normaliser={normaliser}; wanted diameter or sqrt_area")
+    known = _known(found, truth, target)
+    surface = geodesics(target, distance)
+    asked = np.flatnonzero((known.indices >= 0) & (found.indices >= 0))
+    errors = np.full(len(found), np.nan)
+    between = surface.pairs(known.indices[asked], found.indices[asked])
+    diameter = surface.diameter()
+    worst = max(diameter, float(between[np.isfinite(between)].max(initial=0.0)))
+    errors[asked] = np.minimum(between, worst)
+    return errors / (diameter if normaliser == "diameter" else float(np.sqrt(target.area)))
+
+
+def _known(found: VertexMap, truth: VertexMap | ArrayLike, target: Mesh) -> VertexMap:
+    """Return the truth as a map that fits to the one that was found."""
     given = truth.indices if isinstance(truth, VertexMap) else np.asarray(truth)
     known = VertexMap(given, target.n_vertices, f"the truth of {found.source}", found.target)
     n = found.n_target if not isinstance(truth, VertexMap) else truth.n_target
@@ -73,11 +86,4 @@ def map_errors(
             f"{len(known)} to {n} and a mesh of {target.n_vertices} do not fit; wanted the true vertex of "
             f"{found.target} for each vertex of {found.source}"
         )
-    surface = geodesics(target, distance)
-    asked = np.flatnonzero((known.indices >= 0) & (found.indices >= 0))
-    errors = np.full(len(found), np.nan)
-    between = surface.pairs(known.indices[asked], found.indices[asked])
-    diameter = surface.diameter()
-    worst = max(diameter, float(between[np.isfinite(between)].max(initial=0.0)))
-    errors[asked] = np.minimum(between, worst)
-    return errors / (diameter if normaliser == "diameter" else float(np.sqrt(target.area)))
+    return known

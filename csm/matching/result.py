@@ -121,17 +121,16 @@ class Match:
     def transfer(self, what: Any, kind: Kind | None = None, *, fill: Any = None) -> Any:
         """Bring something from the target to the source: fields, labels, colours, landmarks or a texture.
 
-        ``match.inverse.transfer`` brings things from the source to the target.  See `csm.matching.transfer.transfer`
-        for every kind.
+        ``match.inverse.transfer`` brings things from the source to the target.  See `csm.matching.transfer.transfer`.
 
         Parameters
         ----------
         what
             An array with a row per vertex or face of the target, a list of its vertices (kind="landmarks"), or a
-            `csm.mesh.io.textured.Textured`.
+            `csm.mesh.textured.Textured`.
         kind
-            "values", "labels", "face_labels", "face_values", "colors", "normals", "landmarks" or "texture"; None to
-            tell by the type and the shape.
+            "values", "labels", "faces", "colors", "normals", "landmarks" or "texture", see
+            `csm.matching.transfer.Kind`; None to tell by the type and the shape.
         fill
             What vertices without a partner get; None for NaN, or -1 for labels.
         """

@@ -23,6 +23,20 @@ from csm.mesh.shape import Mesh
 from csm.mesh.textured import Textured
 
 Kind: TypeAlias = Literal["values", "labels", "faces", "landmarks", "colors", "normals", "texture"]
+"""What is transferred:
+
+- "values": numbers per vertex, shape (N_target, ...); linear within faces, so averages of three corners.
+- "labels": per vertex, shape (N_target, ...), of any type; those of the nearest corner, never averaged.
+- "faces": labels or numbers per face, shape (M_target, ...); a face of the source has those of the target's
+  face that its centre lands on.
+- "landmarks": vertices of the target, shape (L,); each becomes the vertex of the source that it goes to along
+  `back`.
+- "colors": uint8, shape (N_target, 3) or (N_target, 4); averaged and rounded.
+- "normals": unit vectors, shape (N_target, 3); averaged and made unit again.  They stay as they stand in the
+  space of the target: they are not turned with the surface.
+- "texture": a `Textured` copy of the target, or the .obj, .glb or .gltf file of one; becomes a `Textured` copy
+  of the source with the same images and new texture coordinates, see `csm.matching.texture`.
+"""
 
 
 def transfer(
@@ -40,19 +54,7 @@ def transfer(
     Parameters
     ----------
     what
-        By `kind`:
-
-        - "values": numbers per vertex, shape (N_target, ...); linear within faces, so averages of three corners.
-        - "labels": per vertex, shape (N_target, ...), of any type; those of the nearest corner, never averaged.
-        - "faces": labels or numbers per face, shape (M_target, ...); a face of the source has those of the target's
-          face that its centre lands on.
-        - "landmarks": vertices of the target, shape (L,); each becomes the vertex of the source that it goes to along
-          `back`.
-        - "colors": uint8, shape (N_target, 3) or (N_target, 4); averaged and rounded.
-        - "normals": unit vectors, shape (N_target, 3); averaged and made unit again.  They stay as they stand in the
-          space of the target: they are not turned with the surface.
-        - "texture": a `Textured` copy of the target, or the .obj, .glb or .gltf file of one; becomes a `Textured` copy
-          of the source with the same images and new texture coordinates, see `csm.matching.texture`.
+        Numbers, labels, vertices, a texture or its file, as `Kind` says.
     along
         The map source -> target.
     source, target
@@ -95,6 +97,11 @@ def transfer(
     kind = kind or _told(given, target)
     if kind == "faces":
         return pull_faces(given, along, source, target, fill=fill)
+    return _pulled(given, along, kind, fill)
+
+
+def _pulled(given: NDArray[Any], along: BarycentricMap, kind: Kind, fill: Any) -> NDArray[Any]:
+    """Pull something back that is known at vertices."""
     if kind == "labels":
         return pull_labels(given, along, fill=fill)
     if kind == "texture":
