@@ -14,10 +14,11 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from csm._types import FloatArray, IntArray
+from csm._types import BoolArray, FloatArray, IntArray
 
 _BLOCK = 2**21  # distances at a time
 _PAIRS = 2**19  # query-vertex pairs at a time: each has about six faces
+_ROWS = 4096  # queries of a tree at a time
 _FEW_DIMENSIONS = 6  # up to which a tree is faster than all distances
 _SIDES = ((0, 1), (1, 2), (2, 0))
 
@@ -28,6 +29,12 @@ class OnTriangles(NamedTuple):
     faces: IntArray
     weights: FloatArray
     squared: FloatArray
+
+
+class _Tree(NamedTuple):
+    points: cKDTree
+    vertices: IntArray
+    reach: float  # the greatest squared radius of a face at one of them
 
 
 def on_triangles(corner: FloatArray, side: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -71,7 +78,7 @@ def _inside(corner: FloatArray, side: FloatArray) -> tuple[FloatArray, FloatArra
 def nearest_triangles(queries: FloatArray, vertices: FloatArray, faces: IntArray) -> OnTriangles:
     """Return the nearest points of a mesh, see `csm.matching.barycentric.nearest_on_faces`."""
     search = _Search(queries, vertices, faces)
-    rows = max(1, _BLOCK // len(vertices))
+    rows = _ROWS if search.trees else max(1, _BLOCK // len(vertices))
     found = [search.block(np.arange(i, min(i + rows, len(queries)))) for i in range(0, len(queries), rows)]
     chosen = np.concatenate([np.empty(0, dtype=np.int64), *found])
     weights, squared = search.measured(np.arange(len(queries)), chosen)
@@ -91,18 +98,27 @@ class _Search:
         self.reach = np.full(len(vertices), -np.inf)  # of a vertex: the greatest radius of its faces
         np.maximum.at(self.reach, faces.ravel(), np.repeat(self.radius, 3))
         self.norms = np.where(np.isfinite(self.reach), (self.vertices**2).sum(1), np.inf)
-        used = np.flatnonzero(np.isfinite(self.reach))
-        few = queries.shape[1] <= _FEW_DIMENSIONS
-        self.tree, self.used = (cKDTree(self.vertices[used]) if few else None), used
+        used = np.isfinite(self.reach)
+        self.trees = self._planted(used) if queries.shape[1] <= _FEW_DIMENSIONS else []
         largest = float(self.norms[used].max())
         self.rounding = 32 * np.finfo(float).eps * (largest + (self.queries**2).sum(1))
 
+    def _planted(self, used: BoolArray) -> list[_Tree]:
+        """Return trees of vertices of much the same reach, so that one large face makes no search of others wide."""
+        level = np.zeros(len(used), dtype=np.int64)
+        largest = float(self.reach[used].max(initial=0.0))
+        small = used & (self.reach < largest)
+        level[small] = np.minimum(np.log2(largest / np.maximum(self.reach[small], largest * 2.0**-40)), 40) // 4
+        members = [np.flatnonzero(used & (level == number)) for number in np.unique(level[used])]
+        return [_Tree(cKDTree(self.vertices[m]), m, float(self.reach[m].max(initial=0.0))) for m in members]
+
     def block(self, rows: IntArray) -> IntArray:
         """Return the nearest face of each of these queries."""
-        of, vertex = self._near(rows) if self.tree is not None else self._near_by_products(rows)
-        if len(of) > _PAIRS and len(rows) > 1:
+        found = self._near(rows) if self.trees else self._near_by_products(rows)
+        if found is None or (len(found[0]) > _PAIRS and len(rows) > 1):
             half = len(rows) // 2
             return np.concatenate([self.block(rows[:half]), self.block(rows[half:])])
+        of, vertex = found
         count = self.first[vertex + 1] - self.first[vertex]
         before = np.repeat(np.cumsum(count) - count, count)
         face = self.fan[np.repeat(self.first[vertex], count) + np.arange(count.sum()) - before]
@@ -117,16 +133,26 @@ class _Search:
         of, vertex = np.nonzero(squared - self.reach <= limit[:, None])
         return of, vertex
 
-    def _near(self, rows: IntArray) -> tuple[IntArray, IntArray]:
-        """Do the same with a tree, in few dimensions."""
-        assert self.tree is not None
+    def _near(self, rows: IntArray) -> tuple[IntArray, IntArray] | None:
+        """Do the same with trees, in few dimensions; None if there would be too many pairs."""
         points = self.queries[rows]
-        limit = self.tree.query(points)[0] ** 2 + self.rounding[rows]
-        balls = self.tree.query_ball_point(points, np.sqrt(limit + max(self.radius.max(), 0.0)), return_sorted=True)
-        of = np.repeat(np.arange(len(rows)), [len(ball) for ball in balls])
-        vertex = self.used[np.concatenate([np.asarray(ball, dtype=np.int64) for ball in balls])]
-        squared = ((points[of] - self.vertices[vertex]) ** 2).sum(1)
-        near = squared - self.reach[vertex] <= limit[of]
+        away = np.stack([np.asarray(tree.points.query(points)[0]) for tree in self.trees])
+        limit = away.min(0) ** 2 + self.rounding[rows]
+        radii = [np.sqrt(limit + tree.reach) for tree in self.trees]
+        counts = [
+            tree.points.query_ball_point(points, radius, return_length=True)
+            for tree, radius in zip(self.trees, radii, strict=True)
+        ]
+        if np.sum(counts) > _PAIRS and len(rows) > 1:
+            return None
+        pairs = []
+        for tree, radius, count in zip(self.trees, radii, counts, strict=True):
+            inside = np.flatnonzero(count)
+            balls = tree.points.query_ball_point(points[inside], radius[inside])
+            numbers = np.concatenate([np.empty(0, dtype=np.int64), *(np.asarray(b, dtype=np.int64) for b in balls)])
+            pairs.append((np.repeat(inside, count[inside]), tree.vertices[numbers]))
+        of, vertex = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
+        near = ((points[of] - self.vertices[vertex]) ** 2).sum(1) - self.reach[vertex] <= limit[of]
         return of[near], vertex[near]
 
     def _best(self, rows: IntArray, of: IntArray, face: IntArray) -> IntArray:

@@ -68,6 +68,24 @@ def test_small_blocks_and_a_search_that_is_split_change_nothing(width, monkeypat
     np.testing.assert_allclose(again.weights, found.weights, atol=1e-12)
 
 
+def test_faces_of_very_different_sizes_are_found_by_trees_as_by_products(monkeypatch):
+    mesh, rng = blob(2), np.random.default_rng(4)
+    sizes = 10.0 ** rng.integers(-3, 4, 60)
+    triangles = rng.normal(size=(60, 3, 3)) * sizes[:, None, None] + rng.normal(size=(60, 1, 3)) * sizes[:, None, None]
+    points = np.vstack([mesh.vertices, triangles.reshape(-1, 3), np.zeros((1, 3))])
+    faces = np.vstack([mesh.faces, np.arange(180).reshape(-1, 3) + 162, [[342, 342, 342]]])
+    queries = np.vstack([rng.normal(size=(150, 3)) * 10.0 ** rng.integers(-3, 4, (150, 1)), np.zeros((1, 3))])
+    found = nearest_on_faces(queries, points, faces)
+    monkeypatch.setattr(_triangles, "_FEW_DIMENSIONS", 0)
+    again = nearest_on_faces(queries, points, faces)
+    np.testing.assert_allclose(
+        np.linalg.norm(found.pull(points) - queries, axis=1),
+        np.linalg.norm(again.pull(points) - queries, axis=1),
+        rtol=1e-9,
+        atol=1e-7,
+    )
+
+
 def test_faces_without_area_are_as_good_as_their_sides():
     line = np.array([[0.0, 0, 0], [1, 0, 0], [3, 0, 0], [3, 0, 0], [9, 9, 9]])
     found = nearest_on_faces([[2.0, 1, 0], [-1, 0, 0], [3, 2, 0]], line, np.array([[0, 1, 2], [2, 3, 3]]))
