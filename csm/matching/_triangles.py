@@ -97,8 +97,9 @@ class _Search:
         self.first, self.fan = fans.indptr.astype(np.int64), fans.indices.astype(np.int64)
         self.reach = np.full(len(vertices), -np.inf)  # of a vertex: the greatest radius of its faces
         np.maximum.at(self.reach, faces.ravel(), np.repeat(self.radius, 3))
-        self.norms = np.where(np.isfinite(self.reach), (self.vertices**2).sum(1), np.inf)
         used = np.isfinite(self.reach)
+        self.vertices[~used] = 0.0  # they may be anywhere, or nowhere
+        self.norms = np.where(used, (self.vertices**2).sum(1), np.inf)
         self.trees = self._planted(used) if queries.shape[1] <= _FEW_DIMENSIONS else []
         largest = float(self.norms[used].max())
         self.rounding = 32 * np.finfo(float).eps * (largest + (self.queries**2).sum(1))

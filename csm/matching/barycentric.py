@@ -165,9 +165,9 @@ def nearest_on_faces(
 ) -> BarycentricMap:
     """Find, for each query, the nearest point (Euclidean) of a triangle mesh in a space of Q dimensions.
 
-    With spectral embeddings, or these beside descriptors, it is the precise map of Ezuz and Ben-Chen (section 4.1), and
-    with Q = 3 the projection onto a surface.  The result is exact.  Most faces are ruled out by their corners: from a
-    point at squared distances d_i to the corners of a triangle, the squared distance to the triangle is at least
+    With spectral embeddings, or these beside descriptors, it is the precise map of Ezuz and Ben-Chen, and with Q = 3
+    the projection onto a surface.  The result is exact.  Most faces are ruled out by their corners: from a point at
+    squared distances d_i^2 to the corners of a triangle, the squared distance to the triangle is at least
     min d_i^2 - r^2, where r is the radius of the smallest ball around the triangle.  Of faces at the same distance, up
     to rounding, the one of lowest number is taken.
 

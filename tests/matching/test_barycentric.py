@@ -93,8 +93,10 @@ def test_faces_without_area_are_as_good_as_their_sides():
     assert found.faces[2] == 0
 
 
-def test_vertices_in_no_face_are_never_reached():
-    lone = np.vstack([SQUARE, [[0.5, 5.0]]])
+@pytest.mark.parametrize("few", [0, 6])
+def test_vertices_in_no_face_are_never_reached_wherever_they_are(few, monkeypatch):
+    monkeypatch.setattr(_triangles, "_FEW_DIMENSIONS", few)
+    lone = np.vstack([SQUARE, [[0.5, 5.0], [np.nan, np.inf]]])
     found = nearest_on_faces([[0.5, 5.0]], lone, HALVES)
     np.testing.assert_allclose(found.pull(lone), [[0.5, 1.0]])
 
