@@ -24,12 +24,15 @@ if TYPE_CHECKING:
     from csm.evaluation.engine import evaluate
     from csm.evaluation.protocol import EvaluationProtocol
     from csm.evaluation.results import Evaluation
-    from csm.matching import Match, VertexMap, match_features, match_meshes
+    from csm.matching import Match, VertexMap, match_features
+    from csm.matching import match_meshes as match_meshes
+    from csm.matching.match import match
     from csm.matching.network import load_model
     from csm.mesh import Mesh, PointMap, read_mesh, write_mesh
     from csm.mesh.check import check
     from csm.mesh.clean import Cleaned, clean
     from csm.mesh.io import read_polygons
+    from csm.mesh.io.textured import read_textured, write_textured
     from csm.operators import Operators
     from csm.operators.geodesic import geodesics
 
@@ -42,11 +45,13 @@ _PLACES = {
     "csm.evaluation.protocol": ("EvaluationProtocol",),
     "csm.evaluation.results": ("Evaluation",),
     "csm.matching": ("Match", "VertexMap", "match_features", "match_meshes"),
+    "csm.matching.match": ("match",),
     "csm.matching.network": ("load_model",),
     "csm.mesh": ("Mesh", "PointMap", "read_mesh", "write_mesh"),
     "csm.mesh.check": ("check",),
     "csm.mesh.clean": ("Cleaned", "clean"),
     "csm.mesh.io": ("read_polygons",),
+    "csm.mesh.io.textured": ("read_textured", "write_textured"),
     "csm.operators": ("Operators",),
     "csm.operators.geodesic": ("geodesics",),
 }
@@ -71,13 +76,15 @@ __all__ = [
     "geodesics",
     "load_humans",
     "load_model",
+    "match",
     "match_features",
-    "match_meshes",
     "preset",
     "read_mesh",
     "read_polygons",
+    "read_textured",
     "recognise",
     "write_mesh",
+    "write_textured",
 ]
 
 
@@ -89,4 +96,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*(name for name in globals() if name.startswith("__")), *__all__})

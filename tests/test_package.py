@@ -25,11 +25,14 @@ def test_operators_and_descriptors_do_not_load_torch():
 
 def test_matching_and_evaluation_do_not_load_lightning_or_hydra():
     code = (
-        "import sys, csm; csm.match_meshes; csm.evaluate; csm.preset; csm.load_humans; "
+        "import sys, csm; csm.match; csm.evaluate; csm.preset; csm.load_humans; "
         "sys.exit(bool({'lightning', 'hydra'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-def test_public_names_are_listed():
-    assert {*csm.__all__} <= {*dir(csm)}
+def test_exactly_the_public_names_are_listed():
+    import csm.mesh.check
+
+    assert [name for name in dir(csm) if not name.startswith("__")] == sorted(csm.__all__)
+    assert {"__version__", "__doc__", "__all__"} <= {*dir(csm)}

@@ -12,7 +12,7 @@ import csm
 from csm.errors import CsmError
 from tests.shapes import blob
 
-ODD = [None, 3, np.zeros((4, 3)), [1, 2], {"a": 1}, trimesh.creation.box()]
+ODD = [None, 3, np.zeros((4, 3)), [1, 2], {"a": 1}, trimesh.Scene([trimesh.creation.box()] * 2)]
 
 
 @pytest.mark.parametrize("odd", ODD, ids=lambda odd: type(odd).__name__)
@@ -27,10 +27,10 @@ ODD = [None, 3, np.zeros((4, 3)), [1, 2], {"a": 1}, trimesh.creation.box()]
         csm.geodesics,
         csm.load_model,
         csm.ACD(),
-        lambda odd: csm.match_meshes(odd, blob(1), "gps"),
-        lambda odd: csm.match_meshes(blob(1), blob(1), odd),
-        lambda odd: csm.match_meshes(blob(1), blob(1), "gps", odd),
-        lambda odd: csm.match_meshes(blob(1), blob(1), "gps", clean=odd),
+        lambda odd: csm.match(odd, blob(1), "gps"),
+        lambda odd: csm.match(blob(1), blob(1), odd),
+        lambda odd: csm.match(blob(1), blob(1), "gps", odd),
+        lambda odd: csm.match(blob(1), blob(1), "gps", clean=odd),
     ],
     ids=[
         "read",

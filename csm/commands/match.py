@@ -32,7 +32,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     write_match(match, folder, text, time.perf_counter() - begun)
     for note in match.notes:
         print(f"note: {note}")
-    unmatched = f"{match.map.n_unmatched} of them without a partner; " if match.map.n_unmatched else ""
+    unmatched = f"{match.vertex_map.n_unmatched} of them without a partner; " if match.vertex_map.n_unmatched else ""
     print(
         f"{match.source.name} ({match.source.n_vertices} vertices) -> {match.target.name} "
         f"({match.target.n_vertices} vertices) by {text}: {unmatched}{100 * match.coverage:.1f} % of the target's "

@@ -59,6 +59,9 @@ class Store:
         self.root = Path(root or os.environ.get("CSM_CACHE") or platformdirs.user_cache_dir("csm")).expanduser()
         self.computed = 0
 
+    def __repr__(self) -> str:
+        return f"Store({str(self.root)!r})"
+
     def path(self, kind: str, mesh: Mesh, params: Mapping[str, Any]) -> Path:
         """Return the file that holds, or would hold, this entry."""
         return self.root / kind / entry_name(kind, mesh.digest, params)

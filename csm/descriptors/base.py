@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from csm._types import FloatArray
-from csm.errors import ConfigError
-from csm.mesh.shape import Mesh
+from csm.mesh.inputs import MeshLike, as_mesh
 from csm.operators.operators import Operators
 
 
@@ -91,8 +90,10 @@ class Descriptor(ABC):
         """
         return int(getattr(self, "k", 0))
 
-    def __call__(self, shape: Mesh | Operators) -> Features:
+    def __call__(self, shape: MeshLike | Operators) -> Features:
         """Evaluate on a mesh, which is first scaled to unit area, or on operators made before, used as they are.
+
+        A mesh may be a file, of csm, of trimesh, or a pair (vertices, faces) of arrays.
 
         Debris takes no part (`csm.mesh.debris`); a vertex of it has the row of the nearest vertex of the body.
         """
@@ -129,26 +130,16 @@ def record(descriptor: Descriptor) -> dict[str, Any]:
     return found if descriptor.version == 1 else {**found, "version": descriptor.version}
 
 
-def as_operators(shape: Mesh | Operators) -> Operators:
+def as_operators(shape: MeshLike | Operators) -> Operators:
     """Return `shape` itself if it is `Operators`, else the operators of the mesh at unit area.
 
     Raises
     ------
     ConfigError
-        If it is neither.
+        If it is neither `Operators` nor what `csm.mesh.inputs.as_mesh` takes for a mesh.
+    MeshError
+        If it is a mesh that cannot be read or used.
     """
     if isinstance(shape, Operators):
         return shape
-    if isinstance(shape, Mesh):
-        return Operators(shape)
-    raise ConfigError(
-        f"a descriptor was called on {_named(shape)}; it wants a mesh, as csm.read_mesh(path) returns it, or Operators"
-    )
-
-
-def _named(thing: object) -> str:
-    """Return a phrase for what is no shape."""
-    kind = type(thing).__name__
-    if isinstance(thing, np.ndarray):
-        return f"an array of shape {thing.shape}"
-    return f"the {kind} {str(thing)!r}" if isinstance(thing, str) or hasattr(thing, "__fspath__") else f"a {kind}"
+    return Operators(as_mesh(shape))

@@ -1,13 +1,17 @@
 """From methods to maps: a method describes meshes, a matcher turns two descriptions into a map from shape to shape."""
 
+from csm.matching.barycentric import BarycentricMap, nearest_on_faces
 from csm.matching.base import Described, Matcher
 from csm.matching.maps import VertexMap
-from csm.matching.match import Match, match_features, match_meshes
+from csm.matching.match import match_features, match_meshes
 from csm.matching.methods import DescriptorMethod, Method, PrecomputedMethod, as_method
 from csm.matching.registry import MATCHERS, matcher
+from csm.matching.result import Match
+from csm.matching.way import Way
 
 __all__ = [
     "MATCHERS",
+    "BarycentricMap",
     "Described",
     "DescriptorMethod",
     "Match",
@@ -15,8 +19,10 @@ __all__ = [
     "Method",
     "PrecomputedMethod",
     "VertexMap",
+    "Way",
     "as_method",
     "match_features",
     "match_meshes",
     "matcher",
+    "nearest_on_faces",
 ]

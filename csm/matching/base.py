@@ -122,6 +122,9 @@ class Described:
     classifier: Classifier | None = None
     store: Store | None = None
 
+    def __repr__(self) -> str:
+        return f"Described({self.mesh!r}, {self.features.shape[1]} features)"
+
     @cached_property
     def votes(self) -> Votes:
         """What the classifier says; ConfigError if there is none."""

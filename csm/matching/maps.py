@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from csm._types import IntArray
 from csm.errors import DataError
@@ -13,6 +15,8 @@ from csm.errors import DataError
 @dataclass(frozen=True, eq=False)
 class VertexMap:
     """A map source -> target: for each vertex of the source a vertex of the target.
+
+    ``numpy.asarray(vertex_map)`` is `indices`.
 
     Parameters
     ----------
@@ -59,6 +63,36 @@ class VertexMap:
     def n_unmatched(self) -> int:
         """Number of vertices of the source without a partner (-1)."""
         return int((self.indices < 0).sum())
+
+    def compose(self, other: VertexMap) -> VertexMap:
+        """Return the map that goes first along this one, A -> B, and then along another, B -> C.
+
+        Raises
+        ------
+        DataError
+            If the other map does not begin where this one ends: it is of another number of vertices.
+
+        Examples
+        --------
+        >>> there, back = VertexMap(np.array([2, 0, -1]), 4, "a", "b"), VertexMap(np.array([1, 0, 0, 2]), 3, "b", "a")
+        >>> there.compose(back).indices
+        array([ 0,  1, -1])
+        """
+        if len(other) != self.n_target:
+            raise DataError(
+                f"{self.source} -> {self.target} ends at {self.n_target} vertices, and {other.source} -> "
+                f"{other.target} begins at {len(other)}: one cannot follow the other"
+            )
+        indices = np.where(self.indices >= 0, other.indices[self.indices], -1) if len(other) else self.indices
+        return VertexMap(indices, other.n_target, self.source, other.target)
+
+    def __len__(self) -> int:
+        return len(self.indices)
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        if copy is False and dtype is not None and np.dtype(dtype) != self.indices.dtype:
+            raise ValueError(f"a map of {self.indices.dtype} becomes {np.dtype(dtype)} only as a copy")
+        return np.array(self.indices, dtype=dtype) if copy else np.asarray(self.indices, dtype=dtype)
 
     def __repr__(self) -> str:
         return f"VertexMap({self.source} -> {self.target}, {len(self.indices)} to {self.n_target} vertices)"

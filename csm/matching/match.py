@@ -3,66 +3,26 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
 
 import numpy as np
 
-from csm._types import IntArray
 from csm.data.store import Store
 from csm.descriptors.base import Descriptor
 from csm.matching.base import Matcher, require_device
-from csm.matching.confidence import Confidence, there_and_back
+from csm.matching.confidence import there_and_back
 from csm.matching.maps import VertexMap
 from csm.matching.methods import Method, PrecomputedMethod, as_method
 from csm.matching.nearest import Rows, nearest
 from csm.matching.registry import matcher as as_matcher
-from csm.matching.subjects import Cleaning, MeshLike, Subject, on_given_vertices, subject_of
+from csm.matching.result import Match
+from csm.matching.subjects import Cleaning, Subject, on_given, subject_of
+from csm.matching.way import Way
 from csm.mesh.debris import body_of
-from csm.mesh.shape import Mesh
+from csm.mesh.inputs import MeshLike
 from csm.mesh.topology import rim
 
 
-@dataclass(frozen=True, eq=False)
-class Match:
-    """Two meshes and the map from one to the other.
-
-    Parameters
-    ----------
-    source, target
-        The meshes, with the vertices as they were given.
-    map
-        From every vertex of the source to a vertex of the target; -1 for debris and vertices in no face.
-    confidence
-        How well the vertices of the source return from the target.
-    method, matcher
-        How it was made.
-    notes
-        What a careful reader should know: what the files, the cleaning, the check and the comparison of both say.
-    """
-
-    source: Mesh
-    target: Mesh
-    map: VertexMap
-    confidence: Confidence
-    method: Method
-    matcher: Matcher
-    notes: tuple[str, ...] = ()
-
-    @property
-    def indices(self) -> IntArray:
-        """For each vertex of the source a vertex of the target, shape (N_source,), 0-based."""
-        return self.map.indices
-
-    @property
-    def coverage(self) -> float:
-        """Fraction of the target's vertices that something is mapped to."""
-        return self.map.coverage
-
-    def __repr__(self) -> str:
-        return f"Match({self.map.source} -> {self.map.target} by {self.method.name}, {self.matcher.name})"
-
-
-def match_meshes(
+def match(
     source: MeshLike,
     target: MeshLike,
     method: Method | Descriptor | str = "acd",
@@ -72,12 +32,12 @@ def match_meshes(
     store: Store | str | os.PathLike[str] | None = None,
     device: str = "cpu",
 ) -> Match:
-    """Match two meshes.
+    """Match two meshes; this is ``csm.match``.
 
     Parameters
     ----------
     source, target
-        Meshes, or files that `csm.read_mesh` reads.
+        Files that `csm.read_mesh` reads, meshes of csm or trimesh, or pairs (vertices, faces) of arrays.
     method
         A descriptor, the name of a preset (the default is csm's own setting of ACD), or a trained network of
         `csm.load_model`.
@@ -101,26 +61,30 @@ def match_meshes(
     MeshError
         If a file cannot be read or a mesh cannot be used.
     ConfigError
-        If there is no such method, matcher or device.
+        If there is no such method, matcher or device, or what is given is no mesh.
 
     Examples
     --------
     >>> import csm
     >>> humans = csm.load_humans()
-    >>> csm.match_meshes(humans.mesh("s00_p00"), humans.mesh("s00_p02"), "hks")  # doctest: +SKIP
+    >>> csm.match(humans.mesh("s00_p00"), humans.mesh("s00_p02"), "hks")  # doctest: +SKIP
     Match(s00_p00 -> s00_p02 by hks, nearest)
     """
     chosen, rule, store = as_method(method), as_matcher(matcher), store if isinstance(store, Store) else Store(store)
     if isinstance(chosen, PrecomputedMethod):
         clean = "off"  # its features are those of the given vertices
-    subjects = [subject_of(mesh, clean) for mesh in (source, target)]
+    subjects = [subject_of(mesh, clean, name) for mesh, name in ((source, "source"), (target, "target"))]
     require_device(device)
     here, there = (chosen.describe(subject.cleaned.mesh, store, device) for subject in subjects)
-    forward = on_given_vertices(rule(here, there), subjects[0], subjects[1])
-    backward = on_given_vertices(rule(there, here), subjects[1], subjects[0])
+    forward, backward = Way(rule(here, there)), Way(rule(there, here))
+    forward, backward = on_given(forward, subjects[0], subjects[1]), on_given(backward, subjects[1], subjects[0])
     given = subjects[0].given, subjects[1].given
-    confidence = there_and_back(forward, backward, given[0])
-    return Match(*given, forward, confidence, chosen, rule, _notes(*subjects))
+    confidence = there_and_back(forward.vertex_map, backward.vertex_map, given[0])
+    return Match(*given, forward, backward, confidence, chosen, rule, _notes(*subjects))
+
+
+match_meshes = match
+"""The name of `match` in the first release."""
 
 
 def _notes(source: Subject, target: Subject) -> tuple[str, ...]:

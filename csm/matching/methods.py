@@ -105,6 +105,9 @@ class PrecomputedMethod(Method):
     features: Mapping[str, Tensor | FloatArray]
     name: str = "precomputed"
 
+    def __repr__(self) -> str:
+        return f"PrecomputedMethod({self.name!r}, {len(self.features)} meshes)"
+
     @cached_property
     def key(self) -> Mapping[str, Any]:
         """The hash of all features."""

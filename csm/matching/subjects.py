@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from typing import Literal, TypeAlias, get_args
 
@@ -10,14 +9,15 @@ import numpy as np
 
 from csm._types import IntArray
 from csm.errors import ConfigError
+from csm.matching.barycentric import BarycentricMap
 from csm.matching.maps import VertexMap
+from csm.matching.way import Way
 from csm.mesh.check import Finding, check
 from csm.mesh.clean import Cleaned, clean
-from csm.mesh.io import read_polygons
+from csm.mesh.inputs import MeshLike, as_polygons
 from csm.mesh.polygons import PolygonMesh, triangulated
 from csm.mesh.shape import Mesh
 
-MeshLike: TypeAlias = Mesh | PolygonMesh | str | os.PathLike[str]
 Cleaning: TypeAlias = Literal["auto", "off"]
 
 _MENDED = {
@@ -58,10 +58,19 @@ class Subject:
         return (*said, *([remaining] if remaining else []))
 
 
-def subject_of(mesh: MeshLike, cleaning: Cleaning = "auto") -> Subject:
+def subject_of(mesh: MeshLike, cleaning: Cleaning = "auto", name: str = "mesh") -> Subject:
     """Read a mesh if it is a file, check it, and clean it unless cleaning is "off".
 
     Debris and vertices in no face are left out of the computation in either case.
+
+    Parameters
+    ----------
+    mesh
+        What `csm.mesh.inputs.as_mesh` takes, also with polygons.
+    cleaning
+        Whether to mend a copy for the computation.
+    name
+        What a mesh is called that has no name of its own.
 
     Raises
     ------
@@ -73,7 +82,7 @@ def subject_of(mesh: MeshLike, cleaning: Cleaning = "auto") -> Subject:
     if not isinstance(cleaning, str) or cleaning not in get_args(Cleaning):
         shown = cleaning if isinstance(cleaning, str) else f"a {type(cleaning).__name__}"
         raise ConfigError(f"clean={shown}; wanted {' or '.join(get_args(Cleaning))}")
-    polygons = _read(mesh)
+    polygons = as_polygons(mesh, name)
     if isinstance(polygons, PolygonMesh) and (cleaning == "off" or polygons.all_triangles):
         polygons = polygons.triangles()
     given = polygons if isinstance(polygons, Mesh) else triangulated(polygons).mesh
@@ -86,20 +95,41 @@ def subject_of(mesh: MeshLike, cleaning: Cleaning = "auto") -> Subject:
     return Subject(given, cleaned, findings)
 
 
-def _read(mesh: MeshLike) -> Mesh | PolygonMesh:
-    if isinstance(mesh, Mesh | PolygonMesh):
-        return mesh
-    if isinstance(mesh, str | os.PathLike):
-        return read_polygons(mesh)
-    raise ConfigError(
-        f"a mesh is a file or what csm.read_mesh returns, got a {type(mesh).__name__}; for arrays there is "
-        "csm.Mesh(vertices, faces)"
-    )
-
-
 def on_given_vertices(found: VertexMap, source: Subject, target: Subject) -> VertexMap:
     """Return a map between the cleaned meshes as one between the given ones; -1 for vertices that were left out."""
     at = source.cleaned.vertex_map
     mapped = np.where(at >= 0, found.indices[at], -1)
     indices: IntArray = np.where(mapped >= 0, target.cleaned.origin[mapped], -1)
     return VertexMap(indices, target.given.n_vertices, source.given.name, target.given.name)
+
+
+def on_given_faces(found: BarycentricMap, source: Subject, target: Subject) -> BarycentricMap:
+    """Return a map into faces between the cleaned meshes as one between the given ones; -1 as in `on_given_vertices`.
+
+    A face of the cleaned target is one of the given mesh between the same places, perhaps turned or with corners that
+    were welded; where the given mesh has several such, the first.
+    """
+    at, given = source.cleaned.vertex_map, target.given
+    names = (source.given.name, target.given.name)
+    mapped = np.where(at >= 0, found.faces[at], -1)
+    places = np.where(target.cleaned.vertex_map >= 0, target.cleaned.origin[target.cleaned.vertex_map], -1)
+    corners = places[given.faces]
+    wanted = np.where(mapped[:, None] >= 0, target.cleaned.origin[found.target_faces[mapped]], -1)
+    faces = _rows_of(np.sort(wanted, axis=1), np.sort(corners, axis=1))
+    faces[mapped < 0] = -1
+    same = corners[faces][:, :, None] == wanted[:, None, :]  # corner of the given face, corner of the cleaned one
+    weights = np.einsum("nij,nj->ni", same, np.where(at[:, None] >= 0, found.weights[at], 0.0))
+    return BarycentricMap(faces, weights, given.faces, given.n_vertices, *names)
+
+
+def _rows_of(wanted: IntArray, rows: IntArray) -> IntArray:
+    """Return where each wanted row is among some rows, the first of equal ones; -1 where it is not."""
+    _, first, which = np.unique(np.concatenate([rows, wanted]), axis=0, return_index=True, return_inverse=True)
+    found: IntArray = first[which.ravel()[len(rows) :]]
+    return np.where(found < len(rows), found, -1)
+
+
+def on_given(found: Way, source: Subject, target: Subject) -> Way:
+    """Return one way between the cleaned meshes as one between the given ones; a functional map stays as it is."""
+    precise = None if found.barycentric is None else on_given_faces(found.barycentric, source, target)
+    return Way(on_given_vertices(found.vertex_map, source, target), precise, found.functional_map)

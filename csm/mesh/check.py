@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from csm._types import BoolArray, IntArray
 from csm.errors import MeshError
 from csm.mesh.debris import DEBRIS, body_of
-from csm.mesh.shape import Mesh, require_mesh
+from csm.mesh.inputs import MeshLike, as_mesh
+from csm.mesh.shape import Mesh
 from csm.mesh.topology import components, edge_keys
 
 Severity = Literal["error", "note"]
@@ -58,8 +59,8 @@ class Finding:
     text: str
 
 
-def check(mesh: Mesh) -> tuple[Finding, ...]:
-    """Return all findings about a mesh; errors come first.
+def check(mesh: MeshLike) -> tuple[Finding, ...]:
+    """Return all findings about a mesh, given in any way that `csm.mesh.inputs.as_mesh` takes; errors come first.
 
     Examples
     --------
@@ -67,7 +68,8 @@ def check(mesh: Mesh) -> tuple[Finding, ...]:
     >>> [(f.kind, f.count, f.first, f.severity) for f in check(square)]
     [('unreferenced_vertices', 1, (3,), 'note'), ('boundary', 3, (0, 1, 2), 'note')]
     """
-    topology = _Topology(require_mesh(mesh))
+    mesh = as_mesh(mesh)
+    topology = _Topology(mesh)
     finite = bool(np.isfinite(mesh.vertices[topology.referenced]).all())
     tests: list[Callable[[_Topology], Iterator[Finding]]] = [_faces, _references, _edges, _fans, _components]
     tests = [*tests, _degenerate, _duplicates, _scale] if finite else [_non_finite, *tests]

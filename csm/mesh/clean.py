@@ -19,9 +19,10 @@ from csm._types import BoolArray, FloatArray, IntArray
 from csm.errors import ConfigError, MeshError
 from csm.mesh.check import flat_faces
 from csm.mesh.debris import DEBRIS, body_of
+from csm.mesh.inputs import MeshLike, as_polygons
 from csm.mesh.mending import collapsed, joined_short_edges, sound_faces, split, turns, welded
 from csm.mesh.polygons import PolygonMesh, triangulated
-from csm.mesh.shape import Mesh, require_mesh
+from csm.mesh.shape import Mesh
 
 SAME_PLACE = 1e-5
 """Distance below which boundary vertices are welded, as a fraction of the bounding box's diagonal."""
@@ -77,7 +78,7 @@ class Cleaned:
 
 
 def clean(
-    mesh: Mesh | PolygonMesh,
+    mesh: MeshLike,
     *,
     weld: bool = True,
     split: bool = True,
@@ -90,7 +91,7 @@ def clean(
     Parameters
     ----------
     mesh
-        The mesh, also with polygons (`csm.mesh.io.read_polygons`); it is not changed.
+        The mesh, also with polygons, in any way that `csm.mesh.inputs.as_mesh` takes; it is not changed.
     weld, split, orient
         Whether to take these steps.
     debris
@@ -118,7 +119,8 @@ def clean(
     for name, value in (("debris", 0.0 if debris is None else debris), ("tolerance", tolerance)):
         if isinstance(value, str) or not 0 <= value < 1:
             raise ConfigError(f"{name}={value}; wanted a fraction from 0 to below 1")
-    require_finite(mesh if isinstance(mesh, PolygonMesh) else require_mesh(mesh))
+    mesh = as_polygons(mesh)
+    require_finite(mesh)
     work = _Work.of(mesh)
     unsound = work.drop_unsound_faces()  # a face that is there twice has no boundary to be welded
     if weld:

@@ -94,6 +94,10 @@ class PointMap:
         """The indices without -1, in the order of the "from" side."""
         return self.indices[self.indices >= 0]
 
+    def __repr__(self) -> str:
+        name = f"{self.name!r}, " if self.name else ""
+        return f"PointMap({name}{self.direction.value}, {self.n_from} to {self.n_to} points)"
+
     def as_template_to_shape(self, n_template: int | None = None) -> PointMap:
         """Return this map in the direction template -> shape.
 
@@ -147,6 +151,9 @@ class GroundTruth:
 
     def __len__(self) -> int:
         return len(self.source)
+
+    def __repr__(self) -> str:
+        return f"GroundTruth({len(self)} pairs of vertices)"
 
 
 def ground_truth(source: PointMap, target: PointMap) -> GroundTruth:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from csm._types import FloatArray, IntArray
-from csm.errors import ConfigError, MeshError
+from csm.errors import MeshError
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,24 +198,3 @@ def require_in_range(corners: IntArray, sizes: IntArray, n: int, label: str) -> 
     hint = "; the indices run from 1, so the file is 1-based: subtract 1" if one_based else ""
     there = f"there are {n} (0..{n - 1})" if n else "there is none"
     raise MeshError(f"{label}: face {face} refers to vertex {corners[outside[0]]}, but {there}{hint}")
-
-
-def require_mesh(thing: object) -> Mesh:
-    """Return a mesh as it is.
-
-    Raises
-    ------
-    ConfigError
-        If it is something else.
-
-    Examples
-    --------
-    >>> require_mesh("a.off")
-    Traceback (most recent call last):
-    csm.errors.ConfigError: wanted a mesh, as csm.read_mesh(path) returns it, got the str 'a.off'
-    """
-    if isinstance(thing, Mesh):
-        return thing
-    kind = type(thing).__name__
-    shown = f"the {kind} {str(thing)!r}" if isinstance(thing, str) or hasattr(thing, "__fspath__") else f"a {kind}"
-    raise ConfigError(f"wanted a mesh, as csm.read_mesh(path) returns it, got {shown}")

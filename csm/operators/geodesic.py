@@ -16,7 +16,8 @@ from scipy.sparse.csgraph import dijkstra
 from csm._types import BoolArray, FloatArray, IntArray
 from csm.errors import ConfigError, MeshError
 from csm.mesh.check import check
-from csm.mesh.shape import Mesh, require_mesh
+from csm.mesh.inputs import MeshLike, as_mesh
+from csm.mesh.shape import Mesh
 from csm.mesh.topology import components, edge_graph, half_edges
 from csm.operators._pairs import PairPlan, plan_pairs
 
@@ -53,13 +54,14 @@ class Geodesics(Protocol):
         """
 
 
-def geodesics(mesh: Mesh, method: Method = "exact") -> Geodesics:
+def geodesics(mesh: MeshLike, method: Method = "exact") -> Geodesics:
     """Prepare distances on a mesh.
 
     Parameters
     ----------
     mesh
-        N vertices.  A vertex of no face is infinitely far from all others.
+        N vertices, in any way that `csm.mesh.inputs.as_mesh` takes.  A vertex of no face is infinitely far from all
+        others.
     method
         "exact": the polyhedral metric, by window propagation (Mitchell, Mount, Papadimitriou, SIAM J. Comput. 16, 1987;
         Surazhsky et al., SIGGRAPH 2005) in pygeodesic; propagation stops at the last target, so a pair a few edges
@@ -78,7 +80,7 @@ def geodesics(mesh: Mesh, method: Method = "exact") -> Geodesics:
     kinds: dict[str, type[_OnMesh]] = {"exact": _Exact, "heat": _Heat, "edge": _Edge}
     if method not in kinds:
         raise ConfigError(f"geodesic method {method!r} is unknown: choose one of {', '.join(get_args(Method))}")
-    return kinds[method](require_mesh(mesh))
+    return kinds[method](as_mesh(mesh))
 
 
 class _OnMesh:
@@ -99,6 +101,9 @@ class _OnMesh:
         self.graph = edge_graph(self.vertices, self.faces)
         self.component = components(*half_edges(self.faces), len(self.used))
         self._prepare()
+
+    def __repr__(self) -> str:
+        return f"Geodesics({self.mesh!r}, {self.method})"
 
     def rows(self, sources: IntArray) -> FloatArray:
         sources = self._checked(sources)

@@ -16,7 +16,8 @@ from csm._types import Arrays, FloatArray, IntArray
 from csm.mesh.check import require_usable
 from csm.mesh.debris import Body, body_of, component_areas
 from csm.mesh.debris import unit_area as with_unit_area
-from csm.mesh.shape import Mesh, require_mesh
+from csm.mesh.inputs import MeshLike, as_mesh
+from csm.mesh.shape import Mesh
 from csm.operators.frames import FrameKind, face_frames
 from csm.operators.laplacian import (
     AnisotropicStiffness,
@@ -74,7 +75,7 @@ class Operators:
     Parameters
     ----------
     mesh
-        The shape.
+        The shape, in any way that `csm.mesh.inputs.as_mesh` takes.
     unit_area
         Scale it to a surface area of 1 first, as every default in csm assumes; `self.mesh.scale` keeps the way back.
     memo
@@ -95,8 +96,9 @@ class Operators:
         Number of components that are no debris.
     """
 
-    def __init__(self, mesh: Mesh, *, unit_area: bool = True, memo: Memo | None = None) -> None:
-        require_usable(require_mesh(mesh))
+    def __init__(self, mesh: MeshLike, *, unit_area: bool = True, memo: Memo | None = None) -> None:
+        mesh = as_mesh(mesh)
+        require_usable(mesh)
         found = body_of(mesh)
         self.mesh = with_unit_area(mesh) if unit_area else mesh
         self._debris = found.note
@@ -107,6 +109,9 @@ class Operators:
         self._areas: FloatArray | None = None
         self._anisotropic: dict[tuple[FrameKind, int, float], AnisotropicStiffness] = {}
         self._spectra: dict[tuple[str, tuple[tuple[str, Any], ...]], Spectrum] = {}
+
+    def __repr__(self) -> str:
+        return f"Operators({self.mesh!r})"
 
     def parts(self) -> Iterator[OperatorsOfBody]:
         """Yield the operators of each component of the body by itself, at the scale of the whole."""

@@ -48,6 +48,9 @@ class Spectrum:
     notes: tuple[str, ...] = ()
     name: str = ""
 
+    def __repr__(self) -> str:
+        return f"Spectrum({self.name!r}, {len(self.evals)} eigenpairs, {len(self.mass)} vertices)"
+
     def first(self, k: int) -> Spectrum:
         """Return the `k` smallest pairs of these; ConfigError if there are fewer."""
         if not 1 <= k <= len(self.evals):

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import tempfile
+import webbrowser
 from pathlib import Path
 from typing import Any
 
+from csm.errors import DataError
 from csm.evaluation.provenance import provenance
-from csm.matching.match import Match
+from csm.matching import DescriptorMethod, Match
 from csm.mesh.io import atomic_path, copy_file, write_map, write_mesh
+from csm.mesh.io.guard import refusals
 from csm.mesh.shape import Mesh
 from csm.viewer.colors import position_colors, pull_colors
 from csm.viewer.html import Panel, Viewer, viewer_html, write_html
@@ -22,7 +26,46 @@ ACCOUNT = "match.json"
 """How the match was made; it has the hashes of the other files."""
 
 
-def write_match(match: Match, folder: Path, method: str, seconds: float) -> None:
+def save_match(match: Match, folder: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+    """Write a match to a folder, see `csm.matching.Match.save`, and return the folder.
+
+    Raises
+    ------
+    DataError
+        If a file of such a name is there and may not be replaced, or the folder cannot be written.
+    """
+    folder = Path(folder)
+    there = [name for name in (*FILES, ACCOUNT) if os.path.lexists(folder / name)]
+    if there and not overwrite:
+        raise DataError(
+            f"{folder / there[0]}: there is such a file; give another folder, or overwrite=True to replace it"
+        )
+    write_match(match, folder, in_words(match))
+    return folder
+
+
+def show_match(match: Match) -> Path:
+    """Write the page of a match to a temporary folder, open it in the browser, and return the file."""
+    path = Path(tempfile.mkdtemp(prefix="csm-match-")) / "match.html"
+    write_html(path, match_page(match, in_words(match)))
+    webbrowser.open(path.as_uri())
+    return path
+
+
+def in_words(match: Match) -> str:
+    """Return the method of a match in words.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> in_words(SimpleNamespace(method=SimpleNamespace(name="mine")))
+    'the descriptor mine'
+    """
+    method = match.method
+    return f"the descriptor {method.descriptor if isinstance(method, DescriptorMethod) else method.name}"
+
+
+def write_match(match: Match, folder: Path, method: str, seconds: float | None = None) -> None:
     """Write the `FILES` of a match and its `ACCOUNT`.
 
     The target is coloured by position, and every source vertex has the colour of the vertex that it is mapped to.
@@ -36,12 +79,14 @@ def write_match(match: Match, folder: Path, method: str, seconds: float) -> None
     method
         The method in words, such as "the descriptor ACD(...)".
     seconds
-        How long it took.
+        How long it took, if that is known.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    with refusals(folder, "written"):
+        folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".csm-", dir=folder) as staged:
         account = _write_files(match, Path(staged), method)
-        account = {**account, "seconds": round(seconds, 2), "files": {n: _digest(Path(staged) / n) for n in FILES}}
+        took = {} if seconds is None else {"seconds": round(seconds, 2)}
+        account = {**account, **took, "files": {n: _digest(Path(staged) / n) for n in FILES}}
         with atomic_path(folder / ACCOUNT) as temporary:  # first: what of the others comes after it is known as csm's
             temporary.write_text(json.dumps(account, indent=1) + "\n", encoding="utf-8")
         for name in FILES:
@@ -63,10 +108,16 @@ def _write_files(match: Match, folder: Path, method: str) -> dict[str, Any]:
     _write_confidence(folder / "confidence.txt", match)
     write_mesh(folder / "source.ply", source, colors)
     write_mesh(folder / "target.ply", target, reference)
-    viewer = Viewer([Panel(source, colors, to_reference=indices), Panel(target, reference)], reference=1)
-    page = viewer_html(f"{source.name} → {target.name}", viewer, text=_caption(match, method))
-    write_html(folder / "match.html", page)
+    write_html(folder / "match.html", match_page(match, method))
     return _account(match, meaning, method)
+
+
+def match_page(match: Match, method: str) -> str:
+    """Return the page that shows both meshes of a match."""
+    reference = position_colors(match.target)
+    panel = Panel(match.source, pull_colors(reference, match.indices), to_reference=match.indices)
+    viewer = Viewer([panel, Panel(match.target, reference)], reference=1)
+    return viewer_html(f"{match.source.name} → {match.target.name}", viewer, text=_caption(match, method))
 
 
 def _write_confidence(path: Path, match: Match) -> None:
@@ -96,7 +147,7 @@ def _account(match: Match, meaning: str, method: str) -> dict[str, Any]:
         "target": _of_mesh(match.target),
         "map": f"{meaning}; 0-based, -1 for none",
         "method": f"{match.matcher.name} neighbour in {method}",
-        "unmatched": match.map.n_unmatched,
+        "unmatched": match.vertex_map.n_unmatched,
         "coverage": match.coverage,
         "returned": match.confidence.returned,
         "verdict": match.confidence.verdict,

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+import trimesh
 
 from csm.descriptors import (
     ACD,
@@ -24,7 +25,8 @@ from csm.descriptors import (
     preset,
 )
 from csm.descriptors.base import as_operators, record
-from csm.errors import ConfigError
+from csm.errors import CsmError
+from csm.mesh.io import write_mesh
 from csm.operators import Operators
 from tests.shapes import blob, rotation
 
@@ -162,16 +164,25 @@ def test_a_family_that_cannot_be_evaluated_is_none():
 @pytest.mark.parametrize(
     ("shape", "came"),
     [
-        ("tr_reg_000.off", "the str 'tr_reg_000.off'"),
-        (Path("a/b.off"), r"the PosixPath 'a.b\.off'"),
-        (np.zeros((5, 3)), r"an array of shape \(5, 3\)"),
-        (None, "a NoneType"),
+        ("tr_reg_000.off", r"tr_reg_000\.off: there is no such file"),
+        (Path("a/b.off"), r"a.b\.off: there is no such file"),
+        (np.zeros((5, 3)), r"csm\.read_mesh.* got an array of shape \(5, 3\)"),
+        (None, r"csm\.read_mesh.* got a NoneType"),
     ],
 )
 @pytest.mark.parametrize("descriptor", [HKS(), ACD(), SHOT(), Stack({"a": WKS()})], ids=lambda each: each.name)
 def test_what_is_no_shape_is_refused_by_name(descriptor, shape, came):
-    with pytest.raises(ConfigError, match=f"{came}.*csm.read_mesh"):
+    with pytest.raises(CsmError, match=came):
         descriptor(shape)
+
+
+def test_a_descriptor_takes_every_kind_of_mesh(tmp_path):
+    mesh = blob(2)
+    write_mesh(tmp_path / "a.off", mesh)
+    wanted = HKS(k=20)(mesh).values
+    other = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    for given in (str(tmp_path / "a.off"), tmp_path / "a.off", (mesh.vertices, mesh.faces), other):
+        np.testing.assert_array_equal(HKS(k=20)(given), wanted)
 
 
 def features(q: int = 3) -> Features:

@@ -32,3 +32,24 @@ def test_what_is_no_map_is_refused(indices):
 def test_a_map_survives_pickling():
     again = pickle.loads(pickle.dumps(VertexMap(np.array([2, 1]), 3, "a", "b")))
     assert (again.indices.tolist(), again.n_target, again.source) == ([2, 1], 3, "a")
+
+
+def test_maps_follow_each_other():
+    first = VertexMap(np.array([2, -1, 0]), 3, "a", "b")
+    second = VertexMap(np.array([1, 0, -1]), 2, "b", "c")
+    both = first.compose(second)
+    assert (both.indices.tolist(), both.n_target, both.source, both.target) == ([-1, -1, 1], 2, "a", "c")
+    turn = np.random.default_rng(0).permutation(9)
+    there, back = VertexMap(turn, 9), VertexMap(np.argsort(turn), 9)
+    np.testing.assert_array_equal(there.compose(back), np.arange(9))
+    with pytest.raises(DataError, match="a -> b ends at 3 vertices, and a -> c begins at 2"):
+        first.compose(VertexMap(np.array([0, 1]), 5, "a", "c"))
+
+
+def test_a_map_is_an_array_of_its_indices():
+    found = VertexMap(np.array([2, 1]), 3)
+    assert np.asarray(found).tolist() == [2, 1]
+    assert np.asarray(found, dtype=np.int32).dtype == np.int32
+    assert (len(found), np.arange(3.0)[found].tolist()) == (2, [2.0, 1.0])
+    with pytest.raises(ValueError, match="only as a copy"):
+        found.__array__(np.int32, copy=False)

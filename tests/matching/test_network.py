@@ -41,6 +41,7 @@ def test_a_network_describes_a_mesh_in_the_same_way_wherever_it_comes_from(tmp_p
     method = {
         "memory": lambda: NetworkMethod(module),
         "checkpoint": lambda: load_model(save(module, tmp_path / "model.ckpt")),
+        "checkpoint by text": lambda: load_model(str(save(module, tmp_path / "text.ckpt"))),
         "export": lambda: load_model(export_module(module, tmp_path / "export")),
         "export with classifier": lambda: load_model(export_module(module, tmp_path / "all", classifier=True)),
     }[kept]()

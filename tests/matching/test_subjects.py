@@ -7,8 +7,8 @@ import pytest
 
 from csm.data.store import Store
 from csm.errors import ConfigError, MeshError
-from csm.matching import VertexMap, match_meshes
-from csm.matching.subjects import on_given_vertices, subject_of
+from csm.matching import BarycentricMap, VertexMap, Way, match_meshes
+from csm.matching.subjects import on_given, on_given_faces, on_given_vertices, subject_of
 from csm.mesh.io import read_mesh, write_mesh
 from csm.mesh.shape import Mesh
 from tests.mesh.test_debris import scattered
@@ -87,8 +87,44 @@ def test_a_map_between_cleaned_meshes_becomes_one_between_the_given():
     assert np.flatnonzero(given.indices >= 0).tolist() == sorted(kept)
 
 
+@pytest.mark.parametrize(
+    "case",
+    [
+        "spot_reference.obj",
+        "spot_inside_out.off",
+        "spot_random_face_orientation.off",
+        "spot_split_at_seam.off",
+        "spot_with_300_debris_triangles.off",
+        "quads.ply",
+    ],
+)
+def test_points_in_faces_stay_where_they_are_on_the_given_mesh(spot, case):
+    source, target = subject_of(CASES / "spot_split_at_seam.off"), subject_of(CASES / case)
+    mesh, n, rng = target.cleaned.mesh, source.cleaned.mesh.n_vertices, np.random.default_rng(0)
+    faces = np.where(np.arange(n) == 3, -1, rng.integers(0, mesh.n_faces, n))
+    found = BarycentricMap(faces, rng.dirichlet(np.ones(3), n), mesh.faces, mesh.n_vertices)
+    given = on_given_faces(found, source, target)
+    np.testing.assert_allclose(
+        given.points(target.given), found.points(mesh)[source.cleaned.vertex_map], atol=1e-6 * np.ptp(mesh.vertices)
+    )
+    assert len(given) == source.given.n_vertices > n
+    assert (given.source, given.target) == ("spot_split_at_seam", target.given.name)
+    np.testing.assert_array_equal(given.target_faces, target.given.faces)
+
+
+def test_a_way_is_put_on_the_given_meshes_in_every_form():
+    mesh, kept = scattered(blob(2), 10, 1e-3)
+    source, target = subject_of(mesh), subject_of(blob(2))
+    plain = VertexMap(np.arange(162), 162)
+    way = on_given(Way(plain, BarycentricMap.of_vertices(plain, blob(2).faces), "kept"), source, target)
+    assert np.flatnonzero(way.barycentric.faces >= 0).tolist() == sorted(kept)
+    np.testing.assert_array_equal(way.barycentric.vertex_map(), way.vertex_map)
+    assert way.functional_map == "kept"
+    assert on_given(Way(plain), source, target).barycentric is None
+
+
 def test_what_is_no_mesh_or_no_way_of_cleaning_is_named(tmp_path):
-    with pytest.raises(ConfigError, match=r"got a ndarray; for arrays there is csm\.Mesh"):
+    with pytest.raises(ConfigError, match=r"got an array of shape \(3, 3\) alone; give both"):
         subject_of(np.zeros((3, 3)))
     with pytest.raises(ConfigError, match="clean=full; wanted auto or off"):
         subject_of(blob(2), "full")

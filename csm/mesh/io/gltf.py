@@ -29,7 +29,7 @@ _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _PACKED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
 
 
-class _Shape(NamedTuple):
+class GltfShape(NamedTuple):
     """Primitives of a mesh with one list of vertices, and where its node puts them."""
 
     name: str
@@ -50,9 +50,9 @@ def parse_gltf(data: bytes, choose: Choice, fetch: Fetch) -> RawMesh:
         If it holds several shapes and none is chosen, is compressed, damaged or cut short, or names files that are not
         beside it.
     """
-    document, binary, notes = _document(data)
-    file = _File(document, binary, fetch)
-    shapes, skipped = _shapes(document)
+    document, binary, notes = document_of(data)
+    file = GltfFile(document, binary, fetch)
+    shapes, skipped = shapes_of(document)
     if skipped:
         notes.append(f"{skipped} parts of points or lines were skipped")
     if not shapes:
@@ -62,8 +62,8 @@ def parse_gltf(data: bytes, choose: Choice, fetch: Fetch) -> RawMesh:
     return RawMesh(mesh.vertices, mesh.corners, mesh.sizes, (*notes, *mesh.notes))
 
 
-def _document(data: bytes) -> tuple[dict[str, Any], bytes, list[str]]:
-    """Return the json, the binary part and notes."""
+def document_of(data: bytes) -> tuple[dict[str, Any], bytes, list[str]]:
+    """Return the json, the binary part and notes; MeshError if it is no glTF."""
     notes, binary = [], b""
     if data.startswith(b"glTF"):
         version, length = (int.from_bytes(data[i : i + 4], "little") for i in (4, 8))
@@ -94,7 +94,8 @@ def _chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
         at += 8 + size + -size % 4
 
 
-def _item(document: dict[str, Any], kind: str, number: Any) -> dict[str, Any]:
+def item_of(document: dict[str, Any], kind: str, number: Any) -> dict[str, Any]:
+    """Return an entry of one of the tables of a file; MeshError if it is not there."""
     table = document.get(kind)
     if isinstance(table, list) and isinstance(number, int) and 0 <= number < len(table):
         found = table[number]
@@ -103,12 +104,12 @@ def _item(document: dict[str, Any], kind: str, number: Any) -> dict[str, Any]:
     raise MeshError(f"it refers to number {str(number)[:20]} of its {kind}, which is not there")
 
 
-def _shapes(document: dict[str, Any]) -> tuple[list[_Shape], int]:
+def shapes_of(document: dict[str, Any]) -> tuple[list[GltfShape], int]:
     """Return the shapes in the order of the scene, and how many primitives are no triangles."""
-    shapes: list[_Shape] = []
+    shapes: list[GltfShape] = []
     skipped = 0
     for number, matrix in _placed(document):
-        mesh = _item(document, "meshes", number)
+        mesh = item_of(document, "meshes", number)
         lists: dict[int, list[dict[str, Any]]] = {}
         for primitive in mesh.get("primitives", []):
             if primitive.get("mode", _TRIANGLES) not in (_TRIANGLES, _STRIP, _FAN):
@@ -118,7 +119,7 @@ def _shapes(document: dict[str, Any]) -> tuple[list[_Shape], int]:
         name = str(mesh.get("name", f"mesh {number}"))
         for i, (positions, primitives) in enumerate(lists.items()):
             title = f"{name}, part {i}" if len(lists) > 1 else name
-            shapes.append(_Shape(title[:60], positions, primitives, matrix))
+            shapes.append(GltfShape(title[:60], positions, primitives, matrix))
     return shapes, skipped
 
 
@@ -127,11 +128,11 @@ def _placed(document: dict[str, Any]) -> list[tuple[int, FloatArray]]:
     found: list[tuple[int, FloatArray]] = []
     seen: set[int] = set()
     if document.get("scenes"):
-        roots = _item(document, "scenes", document.get("scene", 0)).get("nodes", [])
+        roots = item_of(document, "scenes", document.get("scene", 0)).get("nodes", [])
         waiting = [(node, np.eye(4)) for node in reversed(roots)]
         while waiting:
             number, parent = waiting.pop()
-            node = _item(document, "nodes", number)
+            node = item_of(document, "nodes", number)
             if number in seen:
                 raise MeshError(f"its node {number} has two parents: it is damaged")
             seen.add(number)
@@ -159,12 +160,15 @@ def _matrix(node: dict[str, Any]) -> FloatArray:
     return matrix
 
 
-class _File:
+class GltfFile:
+    """Meshes and numbers of a file, of which no size is taken on trust."""
+
     def __init__(self, document: dict[str, Any], binary: bytes, fetch: Fetch) -> None:
         self.document, self.binary, self.fetch = document, binary, fetch
         self.buffers: dict[int, bytes] = {}
 
-    def mesh(self, shape: _Shape) -> RawMesh:
+    def mesh(self, shape: GltfShape) -> RawMesh:
+        """Return a shape where the scene puts it."""
         for primitive in shape.primitives:
             packed = [name for name in _PACKED if name in primitive.get("extensions", {})]
             if packed:
@@ -179,6 +183,7 @@ class _File:
         return RawMesh.of(points, faces, ("the vertices are where the scene of the file puts them",))
 
     def faces(self, primitive: dict[str, Any], n_vertices: int) -> IntArray:
+        """Return the triangles of a primitive, shape (M, 3)."""
         if "indices" in primitive:
             corners = self.accessor(primitive["indices"], "SCALAR").ravel().astype(np.int64)
         else:
@@ -197,12 +202,12 @@ class _File:
 
     def accessor(self, number: int, kind: str) -> NDArray[Any]:
         """Return the rows of an accessor, after checking that its bytes are there."""
-        accessor = _item(self.document, "accessors", number)
+        accessor = item_of(self.document, "accessors", number)
         if accessor.get("type") != kind or accessor.get("componentType") not in _COMPONENTS:
             raise MeshError(f"its accessor {number} is no {kind} of a known type of number")
         if "sparse" in accessor or "bufferView" not in accessor:
             raise MeshError(f"its accessor {number} is sparse, which csm does not read")
-        view = _item(self.document, "bufferViews", accessor["bufferView"])
+        view = item_of(self.document, "bufferViews", accessor["bufferView"])
         if any(name in view.get("extensions", {}) for name in _PACKED):
             raise MeshError("it is compressed (meshopt); export it without compression")
         dtype, width, count = np.dtype(_COMPONENTS[accessor["componentType"]]), _WIDTHS[kind], accessor["count"]
@@ -221,12 +226,14 @@ class _File:
         return rows
 
     def buffer(self, number: int) -> bytes:
+        """Return the bytes of a buffer."""
         if number not in self.buffers:
-            uri = _item(self.document, "buffers", number).get("uri")
+            uri = item_of(self.document, "buffers", number).get("uri")
             self.buffers[number] = self.binary if uri is None else self.from_uri(str(uri))
         return self.buffers[number]
 
     def from_uri(self, uri: str) -> bytes:
+        """Return what a uri holds or names; MeshError if it names what is not beside the file."""
         if not uri.startswith("data:"):
             name = unquote(uri)
             if not name or any(part in ("", "..") or ":" in part for part in name.replace("\\", "/").split("/")):

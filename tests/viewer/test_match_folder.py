@@ -1,0 +1,58 @@
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import csm
+from csm.errors import DataError
+from csm.matching import PrecomputedMethod
+from csm.mesh.io import read_mesh
+from csm.viewer.match_folder import ACCOUNT, FILES, in_words, match_page, save_match, write_match
+from tests.shapes import blob
+
+
+@pytest.fixture(scope="module")
+def match(tmp_path_factory) -> csm.Match:
+    return csm.match(blob(2), blob(1), "gps", store=tmp_path_factory.mktemp("store"))
+
+
+def test_the_folder_holds_the_map_and_how_it_was_made(match, tmp_path):
+    write_match(match, tmp_path, "the method in words", 1.234)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*FILES, ACCOUNT])
+    account = json.loads((tmp_path / ACCOUNT).read_text())
+    assert (account["method"], account["seconds"]) == ("nearest neighbour in the method in words", 1.23)
+    assert account["source"]["vertices"] == 162
+    with np.load(tmp_path / "map.npz") as kept:
+        np.testing.assert_array_equal(kept["indices"], match.indices)
+    assert read_mesh(tmp_path / "source.ply").digest == blob(2).digest
+
+
+def test_an_unknown_time_is_left_out_and_the_method_is_said(match, tmp_path):
+    save_match(match, tmp_path / "new" / "folder")
+    account = json.loads((tmp_path / "new" / "folder" / ACCOUNT).read_text())
+    assert "seconds" not in account
+    assert account["method"] == f"nearest neighbour in the descriptor {match.method.descriptor}"
+
+
+def test_files_that_are_there_are_not_replaced(match, tmp_path):
+    (tmp_path / "match.html").write_text("mine")
+    with pytest.raises(DataError, match=r"match\.html: there is such a file"):
+        save_match(match, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["match.html"]
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(DataError, match="cannot be written"):
+        save_match(match, tmp_path / "file")
+
+
+def test_the_page_has_both_names_and_the_verdict(match):
+    page = match_page(match, in_words(match))
+    assert match.confidence.verdict in page
+    assert "of the target vertices are reached" in page
+
+
+def test_methods_of_other_kinds_are_called_by_their_name(match):
+    features = PrecomputedMethod({"blob": np.random.default_rng(0).random((162, 3))}, "mine")
+    other = csm.match(blob(2), blob(2), features)
+    assert in_words(other) == "the descriptor mine"
