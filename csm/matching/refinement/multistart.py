@@ -5,8 +5,8 @@ K eigenfunctions the map of a pair of similar bodies is close to diagonal, so on
 "MapTree: Recovering Multiple Solutions in the Space of Maps", 2020).  So every choice of the first signs is a start,
 alone and applied to the functional map of the descriptor's nearest neighbours.  All are refined together at some
 hundred samples, guided by the descriptor and, against mirrored maps, by the orientation of the surfaces
-(`csm.matching.orientation`); the one that keeps areas, lengths and the descriptor best (`Scores.total`) then climbs to
-all vertices.
+(`csm.matching.orientation`).  The best that differ go on to finer functional maps at more samples, and the one that then
+keeps areas, lengths and the descriptor best (`Scores.total`) climbs to all vertices.
 """
 
 from __future__ import annotations
@@ -22,12 +22,15 @@ from csm.errors import ConfigError
 from csm.matching.base import Described
 from csm.matching.maps import VertexMap
 from csm.matching.refinement.base import RefinedMap, Refiner
-from csm.matching.refinement.batch import Guides, matrices_of, orthogonal, scores, step
+from csm.matching.refinement.batch import Guides, Scores, matrices_of, nearest_rows, orthogonal, scores, step
 from csm.matching.refinement.joint import SCHEDULE, Climb, finished, first_matrix
 from csm.matching.refinement.pair import Pair, SampledPair
 
 _SEARCH = (8, 10, 12, 15, 18, 22, 26, 30, 30)  # sizes of the functional maps of the search
 _UNGUIDED = 3  # of these steps, the last ones, which the orientation does not guide
+_FINAL_SAMPLES = 1000  # vertices of each shape that the choice is made at
+_FINAL = (30, 40, 60, 100)  # sizes of the functional maps before the choice
+_APART = 0.5  # |C - C'| / sqrt(K) from which two functional maps are different maps
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,8 @@ class Multistart(Refiner):
         Vertices of each shape that starts are refined at.
     descriptor, orientation
         Weights of the descriptor and of the pseudo-scalars against the eigenfunctions in the search.
+    finalists
+        How many different maps of the search go on to the choice.
     schedule, weight
         Of the climb, see `csm.matching.refinement.joint.Joint`.
 
@@ -61,6 +66,7 @@ class Multistart(Refiner):
     samples: int = 500
     descriptor: float = 1.0
     orientation: float = 2.0
+    finalists: int = 4
     schedule: tuple[int, ...] = SCHEDULE
     weight: float = 1.0
 
@@ -68,8 +74,10 @@ class Multistart(Refiner):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "schedule", self.climb.schedule)
-        if not 1 <= self.signs <= _SEARCH[0] or self.samples < 10:
-            raise ConfigError(f"{self}: wanted signs from 1 to {_SEARCH[0]} and samples >= 10")
+        if not 1 <= self.signs <= _SEARCH[0] or self.samples < 10 or self.finalists < 1:
+            raise ConfigError(
+                f"{self}: wanted signs from 1 to {_SEARCH[0]}, samples >= 10 and finalists >= 1"
+            )
         if not (self.descriptor >= 0 and self.orientation >= 0):
             raise ConfigError(f"{self}: wanted weights of at least 0")
 
@@ -91,15 +99,29 @@ class Multistart(Refiner):
         sizes = [size for size in _SEARCH if size <= largest] or [largest]
         matrices = self.starts(first_matrix(start.indices, pair, sizes[0]))
         maps = self._refine(matrices, sampled, sizes)
-        judged = scores(maps, sampled, sizes[-1])
+        order = scores(maps, sampled, sizes[-1]).total.argsort()
+        different = _different(matrices_of(maps[order], sampled, sizes[-1]), self.finalists)
+        found, judged = self._finals(different, pair)
         best = int(judged.total.argmin())
-        k = min(self.climb.sizes(pair.k)[0], largest)
         text = (
-            f"the best of {len(matrices)} starts (stretch {float(judged.stretch[best]):.2f}, commutation "
-            f"{float(judged.commutation[best]):.2f}, descriptor {float(judged.descriptor[best]):.2f}), refined jointly "
-            f"with the descriptor to functional maps of {self.climb.sizes(pair.k)[-1]} functions"
+            f"the best of {len(matrices)} starts and {len(found)} different maps of them (stretch "
+            f"{float(judged.stretch[best]):.2f}, commutation {float(judged.commutation[best]):.2f}, descriptor "
+            f"{float(judged.descriptor[best]):.2f}), refined jointly with the descriptor to functional maps of "
+            f"{self.climb.sizes(pair.k)[-1]} functions"
         )
-        return matrices_of(maps[best : best + 1], sampled, k)[0], text
+        return found[best], text
+
+    def _finals(self, matrices: Tensor, pair: Pair) -> tuple[list[Tensor], Scores]:
+        """Refine maps at more samples; return their functional maps, of the first size of the climb, and scores."""
+        climb = Climb(_FINAL, self.weight, samples=_FINAL_SAMPLES, candidates=_FINAL_SAMPLES)
+        sampled, k = pair.sampled(_FINAL_SAMPLES), climb.sizes(pair.k)[-1]
+        maps = []
+        for matrix in matrices:
+            queries, candidates = climb.rows(climb(matrix, pair), pair)
+            maps.append(nearest_rows(queries[sampled.source.at], candidates[sampled.target.at]))
+        together = torch.stack(maps)
+        first = min(self.climb.sizes(pair.k)[0], k)
+        return list(matrices_of(together, sampled, first)), scores(together, sampled, k)
 
     def starts(self, matrix: Tensor) -> Tensor:
         """Return the functional maps (B, K, K) to begin with, made of that of a start, (K, K)."""
@@ -117,3 +139,15 @@ class Multistart(Refiner):
             guides = guided if i < max(1, len(sizes) - _UNGUIDED) else free
             maps = step(matrices_of(maps, sampled, size), sampled, guides)
         return maps
+
+
+def _different(matrices: Tensor, most: int) -> Tensor:
+    """Return up to `most` functional maps that differ from each other, of those in order (B, K, K)."""
+    kept: list[int] = []
+    size = matrices.shape[-1] ** 0.5
+    for i in range(len(matrices)):
+        if all(float((matrices[i] - matrices[j]).norm()) > _APART * size for j in kept):
+            kept.append(i)
+        if len(kept) == most:
+            break
+    return matrices[kept]
