@@ -143,12 +143,16 @@ def make_data(cfg: DictConfig, recipe: Recipe | None = None) -> DataModule:
 
 
 def matching_of(cfg: DictConfig) -> list[str]:
-    """Return the names of the matchers, also where a single one was given without brackets; ConfigError if unknown."""
+    """Return the names of the matchers, each with each refiner such as "nearest+joint"; ConfigError if one is unknown.
+
+    A single name may stand without brackets.
+    """
     from csm.matching.registry import matchers
 
-    names = [cfg.matching] if isinstance(cfg.matching, str) else list(plain(cfg.matching) or [])
-    matchers(names)
-    return names
+    def listed(value: Any) -> list[str]:
+        return [value] if isinstance(value, str) else list(plain(value) or [])
+
+    return [each.name for each in matchers(listed(cfg.matching), listed(cfg.refine))]
 
 
 def make_protocol(cfg: DictConfig) -> EvaluationProtocol:

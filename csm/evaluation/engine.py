@@ -14,7 +14,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from csm._parallel import n_processes, parallel_map
 from csm.data.prepare import Job, prepare
@@ -27,6 +27,7 @@ from csm.evaluation.results import Cell, Evaluation, PairErrors, summarise
 from csm.evaluation.targets import Perturbation, Plan, TargetTask, matched_tasks, measure_target
 from csm.matching.base import Matcher, require_device
 from csm.matching.methods import Method, as_method
+from csm.matching.refinement.base import Refiner
 from csm.matching.registry import matchers as as_matchers
 
 _log = logging.getLogger(__name__)
@@ -38,6 +39,7 @@ def evaluate(
     protocol: EvaluationProtocol | None = None,
     *,
     matching: str | Matcher | Sequence[str | Matcher] = "nearest",
+    refine: str | Refiner | Sequence[str | Refiner] = "none",
     names: Sequence[str] | None = None,
     perturbations: Mapping[str, Perturbation | None] | None = None,
     store: Store | None = None,
@@ -60,6 +62,9 @@ def evaluate(
         Pairs, points, distance and normaliser; by default all, exact, as fractions of the diameter.
     matching
         One or several matchers or their names.
+    refine
+        One or several refiners or their names (`csm.matching.refinement`), "none" for the matcher alone; each matcher
+        is followed by each of them.
     names
         Of the shapes to evaluate; by default all of the set whose correspondence is known.  Of a set with several
         templates, such as TOSCA with its classes, only shapes of one template make a pair.
@@ -84,9 +89,10 @@ def evaluate(
     DataError
         If there is no pair, shapes have no template point in common, or nothing could be measured.
     ConfigError
-        If a method, matcher or device is unknown, or two have one name.
+        If a method, matcher, refiner or device is unknown, or two have one name.
     """
-    plan = _plan(method, shapes, protocol, matching, perturbations, store, results, device, skip_failures)
+    rules = as_matchers(_listed(matching), _listed(refine))
+    plan = _plan(method, shapes, protocol, rules, perturbations, store, results, device, skip_failures)
     templates = templates_of(plan.shapes)
     pairs = plan.protocol.choose(list(templates if names is None else names), templates)
     return _run(plan, pairs, workers, keep_pairs, progress)
@@ -96,26 +102,29 @@ def _plan(
     method: Method | Descriptor | str | Sequence[Method | Descriptor | str],
     shapes: ShapeSet | Sequence[Shape],
     protocol: EvaluationProtocol | None,
-    matching: str | Matcher | Sequence[str | Matcher],
+    rules: Sequence[Matcher],
     perturbations: Mapping[str, Perturbation | None] | None,
     store: Store | None,
     results: Store | None,
     device: str,
     skip_failures: bool,
 ) -> Plan:
-    methods = method if isinstance(method, Sequence) and not isinstance(method, str) else [method]
-    rules = matching if isinstance(matching, Sequence) and not isinstance(matching, str) else [matching]
     return Plan(
         InMemory(shapes) if isinstance(shapes, Sequence) else shapes,
         protocol or EvaluationProtocol(),
-        _by_name([as_method(m) for m in methods], "methods"),
-        _by_name(as_matchers(rules), "matchers"),
+        _by_name([as_method(m) for m in _listed(method)], "methods"),
+        _by_name(rules, "matchers"),
         perturbations or {"": None},
         store or Store(),
         results,
         require_device(device),
         skip_failures,
     )
+
+
+def _listed(one_or_more: Any) -> Sequence[Any]:
+    several = isinstance(one_or_more, Sequence) and not isinstance(one_or_more, str)
+    return one_or_more if several else [one_or_more]
 
 
 def _run(plan: Plan, pairs: Sequence[Pair], workers: int | None, keep_pairs: bool, progress: bool) -> list[Evaluation]:

@@ -9,11 +9,13 @@ from typing import Generic, TypeVar
 from csm.data.shapes import Shape, ShapeSet
 from csm.data.store import Store
 from csm.matching.base import Described
+from csm.matching.embedded import MOST
 from csm.matching.methods import Method
 
 T = TypeVar("T")
 
 _LIMIT = 2**31
+_BYTES_PER_EIGENFUNCTION = 12  # and vertex, in both precisions
 _BYTES_PER_VERTEX = 300  # of a mesh with its map and what is derived from it
 
 
@@ -53,6 +55,8 @@ class Memory:
     ----------
     shapes, methods, store, device
         As in `csm.evaluation.targets.Plan`.
+    refined
+        Whether maps are refined, for which descriptions also hold eigenfunctions.
     limit
         Bytes of shapes, and bytes of descriptions, that stay in memory.
 
@@ -65,7 +69,13 @@ class Memory:
     """
 
     def __init__(
-        self, shapes: ShapeSet, methods: Mapping[str, Method], store: Store, device: str, limit: int = _LIMIT
+        self,
+        shapes: ShapeSet,
+        methods: Mapping[str, Method],
+        store: Store,
+        device: str,
+        refined: bool = False,
+        limit: int = _LIMIT,
     ) -> None:
         def load(name: str) -> Shape:
             shape = shapes.load(name)
@@ -74,5 +84,9 @@ class Memory:
         def describe(method: str, name: str) -> Described:
             return methods[method].describe(self.shape(name).mesh, store, device)
 
+        def size(described: Described) -> int:
+            per_vertex = _BYTES_PER_EIGENFUNCTION * MOST if refined else 0
+            return described.features.nbytes + per_vertex * described.mesh.n_vertices
+
         self.shape = Recent(load, lambda shape: _BYTES_PER_VERTEX * shape.mesh.n_vertices, limit)
-        self.described = Recent(describe, lambda described: described.features.nbytes, limit)
+        self.described = Recent(describe, size, limit)

@@ -19,6 +19,7 @@ from csm.evaluation.protocol import EvaluationProtocol, Pair
 from csm.evaluation.results import Cell, PairErrors, from_arrays, to_arrays
 from csm.matching.base import Described, Matcher
 from csm.matching.methods import DescriptorMethod, Method
+from csm.matching.refinement import Refined
 from csm.mesh.correspondence import ground_truth
 from csm.mesh.perturb import Damaged
 from csm.mesh.shape import Mesh
@@ -71,7 +72,8 @@ class Plan:
 
     def memory(self) -> Memory:
         """Return an empty memory of the shapes and methods."""
-        return Memory(self.shapes, self.methods, self.store, self.device)
+        refined = any(isinstance(rule, Refined) for rule in self.matchers.values())
+        return Memory(self.shapes, self.methods, self.store, self.device, refined)
 
 
 class Matches(NamedTuple):

@@ -109,7 +109,7 @@ class Embedded:
             usable = np.flatnonzero(self.spectrum.mass > 0)
             at = usable[farthest_points(self.mesh.vertices[usable], n)]
             owner = cKDTree(self.mesh.vertices[at]).query(self.mesh.vertices[usable])[1]
-            areas = np.bincount(owner, self.spectrum.mass[usable], minlength=len(at))
+            areas = np.bincount(owner, self.spectrum.mass[usable], minlength=len(at)).astype(np.float64)
             self._samples[n] = Samples(at, self._tensor(areas), self.evecs[at], self._tensor(self._turns[at]))
         return self._samples[n]
 

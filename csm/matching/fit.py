@@ -178,4 +178,5 @@ def _turns(side: Side, spectrum: Spectrum) -> FloatArray:
     weighted = spectrum.evecs * spectrum.mass[:, None]
     smooth = spectrum.evecs @ _coefficients(spectrum, side.features)
     turned = cross_gradients(side.mesh, smooth, spectrum.evecs)  # (N, Q, K)
-    return np.einsum("nk,nql->qkl", weighted, turned, optimize=True)
+    operators: FloatArray = np.einsum("nk,nql->qkl", weighted, turned, optimize=True)
+    return operators

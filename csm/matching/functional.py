@@ -111,10 +111,8 @@ def functional_map(
         return weighted.T @ psi[indices]
     if matched.sum() < k:
         raise ConfigError(f"{int(matched.sum())} matched vertices cannot give a functional map of {k} eigenfunctions")
-    solved: FloatArray = np.linalg.solve(
-        weighted[matched].T @ phi[matched], weighted[matched].T @ psi[indices[matched]]
-    )
-    return solved
+    left, right = weighted[matched].T @ phi[matched], weighted[matched].T @ psi[indices[matched]]
+    return np.linalg.solve(left, right).astype(np.float64)
 
 
 def vertex_map(

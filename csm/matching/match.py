@@ -8,11 +8,13 @@ import numpy as np
 
 from csm.data.store import Store
 from csm.descriptors.base import Descriptor
-from csm.matching.base import Matcher, require_device
+from csm.matching.base import Described, Matcher, require_device
 from csm.matching.confidence import there_and_back
 from csm.matching.maps import VertexMap
 from csm.matching.methods import Method, PrecomputedMethod, as_method
 from csm.matching.nearest import Rows, nearest
+from csm.matching.refinement.base import Refined, Refiner
+from csm.matching.refinement.registry import refiner as as_refiner
 from csm.matching.registry import matcher as as_matcher
 from csm.matching.result import Match
 from csm.matching.subjects import Cleaning, Subject, on_given, subject_of
@@ -27,6 +29,7 @@ def match(
     target: MeshLike,
     method: Method | Descriptor | str = "acd",
     matcher: Matcher | str = "nearest",
+    refine: Refiner | str | None = "multistart",
     *,
     clean: Cleaning = "auto",
     store: Store | str | os.PathLike[str] | None = None,
@@ -43,6 +46,9 @@ def match(
         `csm.load_model`.
     matcher
         A matcher or its name: "nearest", or for networks "argmax".
+    refine
+        A refiner or its name: "multistart", "joint", "zoomout", "bijective" or "icp" (`csm.matching.refinement`);
+        "none" ends at the matcher.
     clean
         "auto" mends copies of the meshes first (`csm.clean`) where they need it; "off" takes them as they are.  The
         result is on the given vertices in either case.
@@ -61,7 +67,7 @@ def match(
     MeshError
         If a file cannot be read or a mesh cannot be used.
     ConfigError
-        If there is no such method, matcher or device, or what is given is no mesh.
+        If there is no such method, matcher, refiner or device, or what is given is no mesh.
 
     Examples
     --------
@@ -70,21 +76,32 @@ def match(
     >>> csm.match(humans.mesh("s00_p00"), humans.mesh("s00_p02"), "hks")  # doctest: +SKIP
     Match(s00_p00 -> s00_p02 by hks, nearest)
     """
-    chosen, rule, store = as_method(method), as_matcher(matcher), store if isinstance(store, Store) else Store(store)
+    chosen, rule, improver = as_method(method), as_matcher(matcher), as_refiner(refine)
+    store = store if isinstance(store, Store) else Store(store)
     if isinstance(chosen, PrecomputedMethod):
         clean = "off"  # its features are those of the given vertices
     subjects = [subject_of(mesh, clean, name) for mesh, name in ((source, "source"), (target, "target"))]
     require_device(device)
     here, there = (chosen.describe(subject.cleaned.mesh, store, device) for subject in subjects)
-    forward, backward = Way(rule(here, there)), Way(rule(there, here))
+    forward, backward, text = _ways(rule, improver, here, there)
     forward, backward = on_given(forward, subjects[0], subjects[1]), on_given(backward, subjects[1], subjects[0])
     given = subjects[0].given, subjects[1].given
     confidence = there_and_back(forward.vertex_map, backward.vertex_map, given[0])
-    return Match(*given, forward, backward, confidence, chosen, rule, _notes(*subjects))
+    made = rule if improver is None else Refined(rule, improver)
+    return Match(*given, forward, backward, confidence, chosen, made, _notes(*subjects), text)
 
 
 match_meshes = match
 """The name of `match` in the first release."""
+
+
+def _ways(rule: Matcher, improver: Refiner | None, here: Described, there: Described) -> tuple[Way, Way, str]:
+    """Return the ways forth and back, and what a refinement did."""
+    if improver is None:
+        return Way(rule(here, there)), Way(rule(there, here)), ""
+    refined = improver(rule(here, there), here, there)
+    backward = refined.backward or improver(rule(there, here), there, here).forward
+    return refined.forward, backward, refined.text
 
 
 def _notes(source: Subject, target: Subject) -> tuple[str, ...]:

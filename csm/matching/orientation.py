@@ -1,8 +1,8 @@
 """Which way round a map goes: pseudo-scalars that a mirrored map turns into their negatives.
 
 The left-right reflection of a body is nearly an isometry, so Laplacians and their spectra cannot tell a map from its
-mirror image.  The orientation of the surfaces can: n . (grad f x grad g), with the outward normal n, of two functions is
-kept by a map that keeps orientation, and changes its sign under one that does not (Ren et al. 2018, section 3).
+mirror image.  The orientation of the surfaces can: n . (grad f x grad g) of two functions, with the outward normal n,
+is kept by a map that keeps orientation, and changes its sign under one that does not (Ren et al. 2018, section 3).
 """
 
 from __future__ import annotations
@@ -80,4 +80,5 @@ def _gather(mesh: Mesh, of_faces: FloatArray) -> FloatArray:
     corners = mesh.faces.ravel()
     faces = np.repeat(np.arange(mesh.n_faces), 3)
     incidence = sparse.csr_array((np.ones(len(corners)), (corners, faces)), shape=(mesh.n_vertices, mesh.n_faces))
-    return incidence @ of_faces
+    gathered: FloatArray = np.asarray(incidence @ of_faces)
+    return gathered

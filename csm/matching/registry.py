@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from csm._places import load
 from csm.errors import ConfigError
 from csm.matching.base import Matcher
+from csm.matching.refinement.base import Refined, Refiner
+from csm.matching.refinement.registry import NONE, refined, refiner
 
 PLACES = {
     "nearest": "nearest:Nearest",
@@ -21,26 +23,40 @@ MATCHERS: dict[str, type[Matcher]] = {name: load(f"csm.matching.{place}") for na
 def matcher(name: str | Matcher) -> Matcher:
     """Return a matcher as it is given, or the one of a name with its default parameters.
 
+    The name of a matcher followed by a refiner has a plus sign, such as "nearest+multistart".
+
     Raises
     ------
     ConfigError
-        If there is no matcher of that name.
+        If there is no matcher or refiner of that name.
 
     Examples
     --------
     >>> matcher("nearest")
     Nearest()
+    >>> matcher("nearest+joint").name
+    'nearest+joint'
     """
     if isinstance(name, Matcher):
         return name
+    if isinstance(name, str) and "+" in name:
+        first, _, second = name.partition("+")
+        rule, improver = matcher(first), refiner(second)
+        return rule if improver is None else Refined(rule, improver)
     if not isinstance(name, str) or name not in MATCHERS:
         shown = repr(name) if isinstance(name, str) else f"a {type(name).__name__}"
         raise ConfigError(f"matching={shown}; wanted {' or '.join(MATCHERS)}")
     return MATCHERS[name]()
 
 
-def matchers(names: Sequence[str | Matcher]) -> list[Matcher]:
-    """Return several matchers; ConfigError if one is unknown or there is none."""
+def matchers(names: Sequence[str | Matcher], refine: Sequence[str | Refiner | None] = (NONE,)) -> list[Matcher]:
+    """Return several matchers, each followed by each of the refiners; ConfigError if one is unknown or there is none.
+
+    Examples
+    --------
+    >>> [each.name for each in matchers(["nearest"], ["none", "icp"])]
+    ['nearest', 'nearest+icp']
+    """
     if not names:
         raise ConfigError(f"matching: wanted one or more of {', '.join(MATCHERS)}")
-    return [matcher(name) for name in names]
+    return refined([matcher(name) for name in names], refine)

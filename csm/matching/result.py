@@ -16,6 +16,7 @@ from csm.matching.barycentric import BarycentricMap
 from csm.matching.base import Matcher
 from csm.matching.confidence import Confidence, there_and_back
 from csm.matching.errors import Normaliser, map_errors
+from csm.matching.functional import FunctionalMap
 from csm.matching.maps import VertexMap
 from csm.matching.methods import Method
 from csm.matching.transfer import Kind, transfer
@@ -40,6 +41,8 @@ class Match:
         How it was made.
     notes
         What a careful reader should know: what the files, the cleaning, the check and the comparison of both say.
+    refinement
+        What the refinement did, in words; empty where there was none.
     """
 
     source: Mesh
@@ -50,6 +53,7 @@ class Match:
     method: Method
     matcher: Matcher
     notes: tuple[str, ...] = ()
+    refinement: str = ""
 
     @property
     def vertex_map(self) -> VertexMap:
@@ -62,7 +66,7 @@ class Match:
         return self.there.barycentric
 
     @property
-    def functional_map(self) -> Any:
+    def functional_map(self) -> FunctionalMap | None:
         """The map between functions on the two meshes; None if that was not computed."""
         return self.there.functional_map
 

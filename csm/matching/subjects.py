@@ -131,5 +131,7 @@ def _rows_of(wanted: IntArray, rows: IntArray) -> IntArray:
 
 def on_given(found: Way, source: Subject, target: Subject) -> Way:
     """Return one way between the cleaned meshes as one between the given ones; a functional map stays as it is."""
-    precise = None if found.barycentric is None else on_given_faces(found.barycentric, source, target)
-    return Way(on_given_vertices(found.vertex_map, source, target), precise, found.functional_map)
+    vertex_map, precise = on_given_vertices(found.vertex_map, source, target), found.precise
+    if precise is None:
+        return Way(vertex_map, found.functional_map)
+    return Way(vertex_map, found.functional_map, lambda: on_given_faces(precise(), source, target))

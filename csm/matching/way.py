@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
 
 from csm.matching.barycentric import BarycentricMap
+from csm.matching.functional import FunctionalMap
 from csm.matching.maps import VertexMap
 
 
@@ -17,16 +19,21 @@ class Way:
     ----------
     vertex_map
         Every vertex of the source to a vertex of the target.
-    barycentric
-        Every vertex of the source into a face of the target; None if that was not computed.
     functional_map
         The map between functions; None if that was not computed.
+    precise
+        Computes the map of every vertex of the source into a face of the target; None if that cannot be.
     """
 
     vertex_map: VertexMap
-    barycentric: BarycentricMap | None = None
-    functional_map: Any = None
+    functional_map: FunctionalMap | None = None
+    precise: Callable[[], BarycentricMap] | None = None
+
+    @cached_property
+    def barycentric(self) -> BarycentricMap | None:
+        """Every vertex of the source into a face of the target, computed when first asked for; None if it cannot be."""
+        return None if self.precise is None else self.precise()
 
     def __repr__(self) -> str:
-        more = [name for name in ("barycentric", "functional_map") if getattr(self, name) is not None]
+        more = [name for name in ("functional_map", "precise") if getattr(self, name) is not None]
         return f"Way({self.vertex_map.source} -> {self.vertex_map.target}, {', '.join(['vertex_map', *more])})"

@@ -8,6 +8,7 @@ import pytest
 from csm.data.store import Store
 from csm.errors import ConfigError, MeshError
 from csm.matching import BarycentricMap, VertexMap, Way, match_meshes
+from csm.matching.functional import FunctionalMap
 from csm.matching.subjects import on_given, on_given_faces, on_given_vertices, subject_of
 from csm.mesh.io import read_mesh, write_mesh
 from csm.mesh.shape import Mesh
@@ -116,10 +117,12 @@ def test_a_way_is_put_on_the_given_meshes_in_every_form():
     mesh, kept = scattered(blob(2), 10, 1e-3)
     source, target = subject_of(mesh), subject_of(blob(2))
     plain = VertexMap(np.arange(162), 162)
-    way = on_given(Way(plain, BarycentricMap.of_vertices(plain, blob(2).faces), "kept"), source, target)
+    functional = FunctionalMap(np.eye(2))
+    way = Way(plain, functional, lambda: BarycentricMap.of_vertices(plain, blob(2).faces))
+    way = on_given(way, source, target)
     assert np.flatnonzero(way.barycentric.faces >= 0).tolist() == sorted(kept)
     np.testing.assert_array_equal(way.barycentric.vertex_map(), way.vertex_map)
-    assert way.functional_map == "kept"
+    assert way.functional_map is functional
     assert on_given(Way(plain), source, target).barycentric is None
 
 

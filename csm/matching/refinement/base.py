@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 
 from csm._types import IntArray
 from csm.matching.base import Described, Matcher
-from csm.matching.functional import FunctionalMap
 from csm.matching.maps import VertexMap
+from csm.matching.way import Way
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,18 +19,15 @@ class RefinedMap:
     Parameters
     ----------
     forward
-        The map source -> target.
+        The way source -> target.
     backward
-        The map target -> source that belongs to it; None if the refiner makes none.
-    functional
-        The functional map of `forward`; None where there is none.
+        The way target -> source that belongs to it; None if the refiner makes none.
     text
         What was done, in words, with its figures.
     """
 
-    forward: VertexMap
-    backward: VertexMap | None = None
-    functional: FunctionalMap | None = None
+    forward: Way
+    backward: Way | None = None
     text: str = ""
 
 
@@ -74,7 +71,7 @@ class Refined(Matcher):
 
     def __call__(self, source: Described, target: Described, at: IntArray | None = None) -> VertexMap:
         """Return the refined map, of all vertices whatever is asked for: a refinement needs all of them."""
-        return self.refiner(self.matcher(source, target), source, target).forward
+        return self.refiner(self.matcher(source, target), source, target).forward.vertex_map
 
     def parameters(self) -> dict[str, Any]:
         """Return the parameters of both."""

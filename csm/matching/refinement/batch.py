@@ -39,7 +39,8 @@ def matrices_of(maps: Tensor, pair: SampledPair, k: int) -> Tensor:
 def orthogonal(matrices: Tensor) -> Tensor:
     """Return the nearest orthogonal matrices (B, k, k)."""
     u, _, v = torch.linalg.svd(matrices)
-    return u @ v
+    factors: Tensor = u @ v
+    return factors
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ map is made orthogonal, as that of a map that keeps areas is.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -18,6 +18,7 @@ from torch import Tensor
 
 from csm._types import FloatArray, IntArray
 from csm.errors import ConfigError
+from csm.matching.barycentric import BarycentricMap, nearest_on_faces
 from csm.matching.base import Described
 from csm.matching.functional import FunctionalMap
 from csm.matching.maps import VertexMap
@@ -25,6 +26,7 @@ from csm.matching.nearest import nearest
 from csm.matching.refinement.base import RefinedMap, Refiner
 from csm.matching.refinement.batch import nearest_rows, orthogonal
 from csm.matching.refinement.pair import Pair
+from csm.matching.way import Way
 
 SCHEDULE = (30, 40, 60, 100, 150, 200)
 """Sizes of the functional maps, one after the other."""
@@ -99,16 +101,11 @@ class Climb:
 
 
 def least_squares(pair: Pair, here: IntArray, there: Tensor, areas: Tensor, k: int) -> Tensor:
-    """Return the functional map (k, k) of a map from vertices `here` of the source to vertices `there` of the target."""
+    """Return the functional map (k, k) of a map from vertices `here` of the source to `there` of the target."""
     phi, psi = pair.source.evecs[here, :k].double(), pair.target.evecs[there, :k].double()
     weighted = phi * areas[:, None].double()
-    return torch.linalg.solve(weighted.T @ phi, weighted.T @ psi).float()
-
-
-def both_ways(matrix: Tensor, pair: Pair, climb: Climb) -> tuple[IntArray, IntArray]:
-    """Return the maps source -> target and target -> source of one functional map, at all vertices."""
-    here, there = climb.rows(matrix, pair)
-    return nearest(here, there), nearest(there, here)
+    solved: Tensor = torch.linalg.solve(weighted.T @ phi, weighted.T @ psi)
+    return solved.float()
 
 
 @dataclass(frozen=True)
@@ -164,18 +161,46 @@ def first_matrix(indices: IntArray, pair: Pair, k: int) -> Tensor:
 
 
 def finished(matrix: Tensor, pair: Pair, climb: Climb, start: VertexMap, text: str) -> RefinedMap:
-    """Return the maps of the last functional map of a climb."""
-    forward, backward = both_ways(matrix, pair, climb)
+    """Return the ways of the last functional map of a climb."""
+    here, there = climb.rows(matrix, pair)
     if climb.orthogonal:
         matrix = orthogonal(matrix)
     c: FloatArray = matrix.double().cpu().numpy()
-    source, target = start.source, start.target
-    return RefinedMap(
-        VertexMap(forward, pair.target.mesh.n_vertices, source, target),
-        VertexMap(backward, pair.source.mesh.n_vertices, target, source),
-        FunctionalMap(c, source, target),
-        text,
-    )
+    names = (start.source, start.target)
+    forward = way_between(here, there, pair, FunctionalMap(c, *names))
+    back = FunctionalMap(c.T, *names[::-1]) if climb.orthogonal else None
+    return RefinedMap(forward, way_between(there, here, pair.reversed, back, names[::-1]), text)
+
+
+def way_between(
+    queries: Tensor,
+    candidates: Tensor,
+    pair: Pair,
+    functional: FunctionalMap | None,
+    names: tuple[str, str] | None = None,
+) -> Way:
+    """Return the way on which every vertex goes to the nearest of the target's rows, or to a point of its faces.
+
+    Parameters
+    ----------
+    queries, candidates
+        Shapes (N_source, D) and (N_target, D): what vertices are compared by.
+    pair
+        The shapes, in this direction.
+    functional
+        The functional map, which has the names of the shapes.
+    names
+        These names, where there is no functional map.
+    """
+    source, target = names or ((functional.source, functional.target) if functional else ("source", "target"))
+    faces = pair.target.mesh.faces
+
+    def precise() -> BarycentricMap:
+        rows, points = queries.double().cpu().numpy(), candidates.double().cpu().numpy()
+        return replace(nearest_on_faces(rows, points, faces), source=source, target=target)
+
+    found = VertexMap(nearest(queries, candidates), pair.target.mesh.n_vertices, source, target)
+    return Way(found, functional, precise)
 
 
 def _text(sizes: Sequence[int]) -> str:

@@ -1,12 +1,12 @@
 """Several starts and a choice: the maps that the eigenfunctions' signs allow, refined, and the best of them.
 
-A map between two poses is nearly perfect or has limbs exchanged: which of the two is decided by the start.  In the first
-K eigenfunctions the map of a pair of similar bodies is close to diagonal, so only the signs are open (Ren et al.,
+A map between two poses is nearly perfect or has limbs exchanged: which of the two is decided by the start.  In the
+first K eigenfunctions the map of a pair of similar bodies is close to diagonal, so only the signs are open (Ren et al.,
 "MapTree: Recovering Multiple Solutions in the Space of Maps", 2020).  So every choice of the first signs is a start,
 alone and applied to the functional map of the descriptor's nearest neighbours.  All are refined together at some
 hundred samples, guided by the descriptor and, against mirrored maps, by the orientation of the surfaces
-(`csm.matching.orientation`).  The best that differ go on to finer functional maps at more samples, and the one that then
-keeps areas, lengths and the descriptor best (`Scores.total`) climbs to all vertices.
+(`csm.matching.orientation`).  The best that differ go on to finer functional maps at more samples, and the one that
+then keeps areas, lengths and the descriptor best (`Scores.total`) climbs to all vertices.
 """
 
 from __future__ import annotations
@@ -75,9 +75,7 @@ class Multistart(Refiner):
     def __post_init__(self) -> None:
         object.__setattr__(self, "schedule", self.climb.schedule)
         if not 1 <= self.signs <= _SEARCH[0] or self.samples < 10 or self.finalists < 1:
-            raise ConfigError(
-                f"{self}: wanted signs from 1 to {_SEARCH[0]}, samples >= 10 and finalists >= 1"
-            )
+            raise ConfigError(f"{self}: wanted signs from 1 to {_SEARCH[0]}, samples >= 10 and finalists >= 1")
         if not (self.descriptor >= 0 and self.orientation >= 0):
             raise ConfigError(f"{self}: wanted weights of at least 0")
 

@@ -45,7 +45,9 @@ class Pair:
         """
         widths = source.features.shape[1], target.features.shape[1]
         if widths[0] != widths[1]:
-            raise ConfigError(f"descriptors of {widths[0]} and {widths[1]} columns; wanted the same ones of both shapes")
+            raise ConfigError(
+                f"descriptors of {widths[0]} and {widths[1]} columns; wanted the same ones of both shapes"
+            )
         here, there = source.features.float(), target.features.float()
         if not (torch.isfinite(here).all() and torch.isfinite(there).all()):
             raise ConfigError("a descriptor is not finite, so it cannot guide a refinement; look at the features")

@@ -18,9 +18,7 @@ PLACES = {
 }
 """Name -> file and class, whose parameters have defaults.  A new refiner is one file and one line here."""
 
-REFINERS: dict[str, type[Refiner]] = {
-    name: load(f"csm.matching.refinement.{place}") for name, place in PLACES.items()
-}
+REFINERS: dict[str, type[Refiner]] = {name: load(f"csm.matching.refinement.{place}") for name, place in PLACES.items()}
 """The classes by name."""
 
 NONE = "none"

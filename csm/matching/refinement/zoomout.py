@@ -17,10 +17,9 @@ from csm.errors import ConfigError
 from csm.matching.base import Described
 from csm.matching.functional import FunctionalMap
 from csm.matching.maps import VertexMap
-from csm.matching.nearest import nearest
 from csm.matching.refinement.base import RefinedMap, Refiner
 from csm.matching.refinement.batch import nearest_rows, orthogonal
-from csm.matching.refinement.joint import first_matrix, least_squares
+from csm.matching.refinement.joint import first_matrix, least_squares, way_between
 from csm.matching.refinement.pair import Pair
 
 
@@ -75,14 +74,13 @@ class ZoomOut(Refiner):
         for size in sizes[1:]:
             queries, rows = adjoint_rows(matrix, pair)
             matrix = least_squares(pair, here, candidates[nearest_rows(queries[here], rows[there])], areas, size)
-        queries, rows = adjoint_rows(matrix, pair)
         text = f"refined by ZoomOut in {len(sizes)} steps, to functional maps of {sizes[-1]} functions"
-        return _result(nearest(queries, rows), None, matrix, pair, start, text)
+        return _result(matrix, pair, start, text, both=False)
 
 
 @dataclass(frozen=True)
 class ICP(Refiner):
-    """Iterative closest points in the eigenfunctions (Ovsjanikov et al. 2012, section 6.2): orthogonal maps of one size.
+    """Iterative closest points in the eigenfunctions (Ovsjanikov et al. 2012, section 6.2): orthogonal, of one size.
 
     Parameters
     ----------
@@ -114,9 +112,8 @@ class ICP(Refiner):
         for _ in range(self.iterations):
             queries, rows = adjoint_rows(matrix, pair)
             matrix = orthogonal(least_squares(pair, everywhere, nearest_rows(queries, rows), pair.source.areas, k))
-        queries, rows = adjoint_rows(matrix, pair)
         text = f"refined by {self.iterations} rounds of ICP with functional maps of {k} functions"
-        return _result(nearest(queries, rows), nearest(rows, queries), matrix, pair, start, text)
+        return _result(matrix, pair, start, text, both=True)
 
 
 @dataclass(frozen=True)
@@ -151,12 +148,10 @@ class Bijective(Refiner):
         pair = Pair.of(source, target)
         sizes = zoomout_sizes(self.first, self.last, self.step, pair.k)
         matrix = first_matrix(start.indices, pair, sizes[0])
-        forward, backward = _to_and_fro(matrix, pair)
         for size in sizes[1:]:
-            matrix = _agreeing(forward, backward, pair, size)
-            forward, backward = _to_and_fro(matrix, pair)
+            matrix = _agreeing(*_to_and_fro(matrix, pair), pair, size)
         text = f"refined by bijective ZoomOut in {len(sizes)} steps, to functional maps of {sizes[-1]} functions"
-        return _result(forward.cpu().numpy(), backward.cpu().numpy(), matrix, pair, start, text)
+        return _result(matrix, pair, start, text, both=True)
 
 
 def adjoint_rows(matrix: Tensor, pair: Pair) -> tuple[Tensor, Tensor]:
@@ -177,7 +172,8 @@ def _agreeing(forward: Tensor, backward: Tensor, pair: Pair, k: int) -> Tensor:
     back = phi[backward]
     left = (phi * a).T @ phi + (back * b).T @ back
     right = (phi * a).T @ psi[forward] + (back * b).T @ psi
-    return torch.linalg.solve(left, right).float()
+    solved: Tensor = torch.linalg.solve(left, right)
+    return solved.float()
 
 
 def _drawn(pair: Pair, n: int) -> tuple[IntArray, Tensor]:
@@ -187,13 +183,10 @@ def _drawn(pair: Pair, n: int) -> tuple[IntArray, Tensor]:
     return samples.at, samples.areas
 
 
-def _result(
-    forward: IntArray, backward: IntArray | None, matrix: Tensor, pair: Pair, start: VertexMap, text: str
-) -> RefinedMap:
-    source, target = start.source, start.target
-    return RefinedMap(
-        VertexMap(forward, pair.target.mesh.n_vertices, source, target),
-        None if backward is None else VertexMap(backward, pair.source.mesh.n_vertices, target, source),
-        FunctionalMap(matrix.double().cpu().numpy(), source, target),
-        text,
-    )
+def _result(matrix: Tensor, pair: Pair, start: VertexMap, text: str, *, both: bool) -> RefinedMap:
+    """Return the ways of a functional map: forth, and back where one matrix serves for both."""
+    queries, rows = adjoint_rows(matrix, pair)
+    names = (start.source, start.target)
+    forward = way_between(queries, rows, pair, FunctionalMap(matrix.double().cpu().numpy(), *names))
+    back = way_between(rows, queries, pair.reversed, None, names[::-1]) if both else None
+    return RefinedMap(forward, back, text)
