@@ -8,6 +8,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from csm._types import FloatArray
 from csm.evaluation.provenance import provenance
 from csm.matching.match import Match
 from csm.mesh.io import atomic_path, copy_file, write_map, write_mesh
@@ -22,7 +23,14 @@ ACCOUNT = "match.json"
 """How the match was made; it has the hashes of the other files."""
 
 
-def write_match(match: Match, folder: Path, method: str, seconds: float) -> None:
+def write_match(
+    match: Match,
+    folder: Path,
+    method: str,
+    seconds: float,
+    *,
+    features: tuple[FloatArray, FloatArray] | None = None,
+) -> None:
     """Write the `FILES` of a match and its `ACCOUNT`.
 
     The target is coloured by position, and every source vertex has the colour of the vertex that it is mapped to.
@@ -37,10 +45,13 @@ def write_match(match: Match, folder: Path, method: str, seconds: float) -> None
         The method in words, such as "the descriptor ACD(...)".
     seconds
         How long it took.
+    features
+        Descriptors of the source's and of the target's vertices, shapes (N_source, Q) and (N_target, Q), which the
+        page then compares with each other.
     """
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".csm-", dir=folder) as staged:
-        account = _write_files(match, Path(staged), method)
+        account = _write_files(match, Path(staged), method, features)
         account = {**account, "seconds": round(seconds, 2), "files": {n: _digest(Path(staged) / n) for n in FILES}}
         with atomic_path(folder / ACCOUNT) as temporary:  # first: what of the others comes after it is known as csm's
             temporary.write_text(json.dumps(account, indent=1) + "\n", encoding="utf-8")
@@ -52,7 +63,9 @@ def _digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def _write_files(match: Match, folder: Path, method: str) -> dict[str, Any]:
+def _write_files(
+    match: Match, folder: Path, method: str, features: tuple[FloatArray, FloatArray] | None
+) -> dict[str, Any]:
     """Write all files but the account, which is returned."""
     source, target, indices = match.source, match.target, match.indices
     meaning = f"line i = vertex of {target.name} that vertex i of {source.name} is mapped to"
@@ -63,8 +76,17 @@ def _write_files(match: Match, folder: Path, method: str) -> dict[str, Any]:
     _write_confidence(folder / "confidence.txt", match)
     write_mesh(folder / "source.ply", source, colors)
     write_mesh(folder / "target.ply", target, reference)
-    viewer = Viewer([Panel(source, colors, to_reference=indices), Panel(target, reference)], reference=1)
-    page = viewer_html(f"{source.name} → {target.name}", viewer, text=_caption(match, method))
+    here, there = features or (None, None)
+    viewer = Viewer(
+        [
+            Panel(source, colors, to_reference=indices, confidence=match.confidence.values, features=here),
+            Panel(target, reference, features=there),
+        ],
+        reference=1,
+        confidence_label="confidence in the match; 1 where a vertex returns to its place there and back",
+    )
+    verdict = f"{match.confidence.verdict}."
+    page = viewer_html(f"{source.name} → {target.name}", viewer, lead=verdict, text=_caption(match, method))
     write_html(folder / "match.html", page)
     return _account(match, meaning, method)
 
@@ -78,7 +100,7 @@ def _write_confidence(path: Path, match: Match) -> None:
 
 def _caption(match: Match, method: str) -> str:
     notes = "".join(f"\n\n**Note.** {note}." for note in match.notes)
-    return _what_is_shown(match, method) + f"\n\n{match.confidence.verdict}.{notes}"
+    return _what_is_shown(match, method) + notes
 
 
 def _what_is_shown(match: Match, method: str) -> str:
