@@ -22,8 +22,8 @@ _STOPS = 12
 _HELP = (
     "Drag, or one finger: turn. Shift-drag, or two fingers: move. Wheel on a mesh that was clicked, or two fingers "
     "apart: zoom. Point at a mesh to see the partner of a vertex; click or tap to pin it. Keys: arrows turn, + and - "
-    "zoom, 0 is the first view, the other numbers choose what the colours show, Enter pins the middle of the mesh, Escape unpins. "
-    "A broken ring lies behind the surface; a small dot is one of several vertices with the same partner."
+    "zoom, 0 is the first view, the other numbers choose what the colours show, Enter pins the middle of the mesh, "
+    "Escape unpins. A broken ring lies behind the surface; a small dot is one of several vertices with one partner."
 )
 _NO_SCRIPT = "The meshes need JavaScript and WebGL; the text of this page needs neither."
 
@@ -36,9 +36,10 @@ def modes(viewer: Viewer) -> list[str]:
 def viewer_block(viewer: Viewer) -> str:
     """Write the html of a viewer; the page's script brings it to life."""
     panels = "\n".join(_panel(panel) for panel in viewer.panels)
+    faces = max(panel.mesh.n_faces for panel in viewer.panels)
     caption = f'<p class="caption">{escape(viewer.caption)}</p>\n' if viewer.caption else ""
     return (
-        f'<div class="viewer">\n<div class="bar">{_buttons(viewer)}</div>\n'
+        f'<div class="viewer" data-faces="{faces}">\n<div class="bar">{_buttons(viewer)}</div>\n'
         f'<div class="scales">{_scales(viewer)}</div>\n'
         f'<div class="panels">\n{panels}\n</div>\n'
         '<div class="readout"><p class="pinned" aria-live="polite"></p><p class="hovered"></p></div>\n'
@@ -71,7 +72,7 @@ def _scales(viewer: Viewer) -> str:
     said = {
         "matched": "Mapped vertices have the same colour. Orange to blue: left to right; dark to light: bottom to top.",
         "checker": "A checkerboard on the mesh that is mapped to, pulled through the map: torn where the map is torn.",
-        "stripes": "Slanted stripes, pulled through the map: they slant the other way where left and right are swapped.",
+        "stripes": "Slanted stripes, pulled through the map: they slant the other way where left and right change.",
         "plain": "The shape alone.",
     }
     unmatched = any(panel.to_reference is not None and min(panel.to_reference) < 0 for panel in viewer.panels)

@@ -16,10 +16,11 @@ class Camera {
   // Move by fractions of the picture's width and height.
   move(dx, dy) { this.x += dx; this.y += dy; }
 
-  magnify(factor) {
-    const zoom = Math.max(0.3, Math.min(40, this.zoom * factor));
-    this.x *= zoom / this.zoom;
-    this.y *= zoom / this.zoom;
+  // Zoom around a place that stays where it is, given as fractions of the picture.
+  magnify(factor, [x, y] = [0.5, 0.5]) {
+    const zoom = Math.max(0.3, Math.min(40, this.zoom * factor)), change = zoom / this.zoom;
+    this.x = x - 0.5 + (this.x - x + 0.5) * change;
+    this.y = y - 0.5 + (this.y - y + 0.5) * change;
     this.zoom = zoom;
   }
 

@@ -26,12 +26,13 @@ function listenToPointers(viewer, panel, index) {
     viewer.turned();
   });
 
-  // One of two fingers moved: half of that moves the meshes, and what it changes of their distance zooms.
+  // One of two fingers moved: the meshes stay between the fingers and grow with their distance.
   function pinch(id, last, here) {
     const [, other] = [...fingers].find(([key]) => key !== id);
     const away = (p) => Math.hypot(p[0] - other[0], p[1] - other[1]) || 1;
-    viewer.camera.magnify(away(here) / away(last));
     viewer.camera.move((here[0] - last[0]) / 2 / canvas.clientWidth, (here[1] - last[1]) / 2 / canvas.clientHeight);
+    const middle = { clientX: (here[0] + other[0]) / 2, clientY: (here[1] + other[1]) / 2 };
+    viewer.camera.magnify(away(here) / away(last), viewer.at(panel, middle));
   }
 
   canvas.addEventListener("pointerup", (event) => {
@@ -46,7 +47,7 @@ function listenToPointers(viewer, panel, index) {
   canvas.addEventListener("wheel", (event) => {
     if (document.activeElement !== canvas && !event.ctrlKey) return; // until it is clicked, the wheel scrolls the page
     event.preventDefault();
-    viewer.camera.magnify(Math.exp(-0.0015 * event.deltaY));
+    viewer.camera.magnify(Math.exp(-0.0015 * event.deltaY), viewer.at(panel, event));
     viewer.turned();
   }, { passive: false });
 }

@@ -1,9 +1,9 @@
 // One WebGL context for the whole page, however many meshes: each panel is a 2D canvas that it is copied to.
 
 class Painter {
-  constructor() {
+  constructor(antialias) {
     this.canvas = document.createElement("canvas");
-    this.gl = this.canvas.getContext("webgl2", { antialias: true, alpha: true, premultipliedAlpha: true });
+    this.gl = this.canvas.getContext("webgl2", { antialias, alpha: true, premultipliedAlpha: true });
     if (!this.gl) throw new Error("it has no WebGL 2");
     this.generation = 0; // how often the context was made; what was uploaded to an earlier one is gone
     this.start();

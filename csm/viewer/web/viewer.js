@@ -124,13 +124,15 @@ class Viewer {
   }
 }
 
+const FEW_FACES = 150000; // beyond this faces are about as small as pixels, and smooth edges cost more than they show
+
 // Make a viewer of each block when it comes near the window: a report may have many.
 function startViewers() {
   const roots = [...document.querySelectorAll(".viewer")], started = [];
   if (roots.length === 0) return;
   let painter;
   try {
-    painter = new Painter();
+    painter = new Painter(Math.max(...roots.map((root) => Number(root.dataset.faces))) <= FEW_FACES);
   } catch (error) {
     for (const root of roots) {
       root.classList.add("dead");
