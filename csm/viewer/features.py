@@ -60,7 +60,7 @@ def compact_features(features: Sequence[ArrayLike], components: int = COMPONENTS
             f"features have shapes {[f.shape for f in rows]}, wanted one row per vertex and the same number of columns "
             "for every shape; describe all shapes with one descriptor"
         )
-    known = [np.isfinite(f).all(axis=1) for f in rows]
+    known = [np.asarray(np.isfinite(f).all(axis=1)) for f in rows]
     together = np.concatenate([f[k] for f, k in zip(rows, known, strict=True)])
     centre = together.mean(axis=0) if len(together) else np.zeros(rows[0].shape[1])
     kept, axes = _principal_axes(together - centre, components)

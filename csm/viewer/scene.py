@@ -64,6 +64,7 @@ class Panel:
 
     def __post_init__(self) -> None:
         n = self.mesh.n_vertices
+        columns = 0 if self.features is None else self.features.shape[-1]
         if self.mesh.n_faces == 0 or not np.isfinite(self.mesh.vertices).all():
             raise MeshError(f"{self.mesh.label}: a page can show only meshes with faces and finite coordinates")
         for what, array, wanted in (
@@ -71,7 +72,7 @@ class Panel:
             ("the map", self.to_reference, (n,)),
             ("errors", self.errors, (n,)),
             ("confidences", self.confidence, (n,)),
-            ("features", self.features, (n, *np.shape(self.features)[1:2])),
+            ("features", self.features, (n, columns)),
         ):
             if array is not None and np.shape(array) != wanted:
                 raise ConfigError(f"{self.mesh.label}: {what} have shape {np.shape(array)}, wanted {wanted}")
