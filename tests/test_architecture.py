@@ -66,7 +66,6 @@ TESTED_ELSEWHERE = {
     "commands.matrix": "commands/test_pipeline.py",
     "errors": "mesh/io/test_files.py",
     "mesh.io.raw": "mesh/io/test_off.py",
-    "viewer.match_folder": "commands/test_pipeline.py",
 }
 """Modules without a test file of their own, with the one that tests them through what uses them."""
 
