@@ -72,7 +72,7 @@ def _scales(viewer: Viewer) -> str:
     said = {
         "matched": "Mapped vertices have the same colour. Orange to blue: left to right; dark to light: bottom to top.",
         "checker": "A checkerboard on the mesh that is mapped to, pulled through the map: torn where the map is torn.",
-        "stripes": "Slanted stripes, pulled through the map: they slant the other way where left and right change.",
+        "stripes": "Slanted stripes pulled through the map; they slant the other way where left and right are swapped.",
         "plain": "The shape alone.",
     }
     unmatched = any(panel.to_reference is not None and min(panel.to_reference) < 0 for panel in viewer.panels)

@@ -42,7 +42,7 @@ vec3 surface() {
   }
   if (pattern == 0) return vColor.rgb;
   vec3 cells = square(vPlace * 20.0 + vec3(0.0, 0.5, 0.5));
-  float slanted = square(vec3(dot(vPlace, vec3(0.6, 0.8, 0.0)) * 26.0)).x;
+  float slanted = square(vec3(dot(vPlace, vec3(0.6, 0.8, 0.0)) * 34.0)).x;
   float tone = pattern == 1 ? cells.x * cells.y * cells.z : slanted;
   return mix(vColor.rgb * 0.52, mix(vColor.rgb, vec3(1.0), 0.3), 0.5 + 0.5 * tone);
 }
