@@ -69,7 +69,7 @@ TESTED_ELSEWHERE = {
 }
 """Modules without a test file of their own, with the one that tests them through what uses them."""
 
-OF_SEVERAL_MODULES = {"commands.matrices", "commands.pipeline", "descriptors.invariants"}
+OF_SEVERAL_MODULES = {"commands.matrices", "commands.pipeline", "descriptors.invariants", "viewer.browser"}
 """Test files without a module of their own, besides those of the whole, which lie directly in tests/."""
 
 

@@ -78,7 +78,10 @@ def installed(tmp_path_factory: pytest.TempPathFactory, wheel: Path) -> Installe
 
 def test_the_wheel_carries_configurations_assets_and_the_type_marker(wheel):
     inside = set(zipfile.ZipFile(wheel).namelist())
-    for folder, kinds in (("conf", ("*.yaml",)), ("csm", ("*.py", "*.html", "*.npz", "*.md", "py.typed"))):
+    for folder, kinds in (
+        ("conf", ("*.yaml",)),
+        ("csm", ("*.py", "*.html", "*.css", "*.js", "*.npz", "*.md", "py.typed")),
+    ):
         for path in (p for kind in kinds for p in (ROOT / folder).rglob(kind)):
             inner = path.relative_to(ROOT) if folder == "csm" else Path("csm") / path.relative_to(ROOT)
             assert inner.as_posix() in inside

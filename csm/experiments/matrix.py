@@ -1,9 +1,9 @@
 """A matrix of trainings and tests: every row is trained once per seed and tested on every test set, resumable.
 
-The folder holds, per row and seed, ``model.ckpt``, how it was trained (``row.json``) and one json per test set and
-matcher.  Cells that exist are not computed again, so a matrix that was ended is started again with the same command; a
-training goes on from its last epoch, a test from its last target.  Matrices with a folder in common share the rows that
-have the same name.
+The folder holds, per row and seed, ``model.ckpt``, how it was trained (``row.json``) and per test set and matcher one
+json and a page with its worst pairs.  Cells that exist are not computed again, so a matrix that was ended is started
+again with the same command; a training goes on from its last epoch, a test from its last target.  Matrices with a
+folder in common share the rows that have the same name.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from csm.data.store import Store
 from csm.errors import ConfigError, CsmError, DataError
 from csm.evaluation.protocol import EvaluationProtocol
 from csm.evaluation.report import ResultRow, average_seeds, read_rows, write_curves_csv, write_rows
+from csm.experiments.pairs import write_pairs
 from csm.experiments.resuming import last_checkpoint, require_same_settings
 from csm.experiments.testing import measure_set
 from csm.experiments.training import Training, fit, sketch
@@ -174,6 +175,7 @@ class Matrix:
                 path = self._file(row, test, one.row.matching)
                 write_rows(path, [one.row])
                 write_curves_csv(path.with_suffix(".cqc.csv"), {test: one.evaluation})
+                write_pairs(path.with_suffix(".html"), one)
                 cells[one.row.matching] = one.row
         return {rule: cell for rule, cell in cells.items() if cell is not None}
 

@@ -6,6 +6,7 @@ import os
 
 import numpy as np
 
+from csm._types import Float32Array
 from csm.data.store import Store
 from csm.descriptors.base import Descriptor
 from csm.matching.base import Described, Matcher, require_device
@@ -87,8 +88,9 @@ def match(
     forward, backward = on_given(forward, subjects[0], subjects[1]), on_given(backward, subjects[1], subjects[0])
     given = subjects[0].given, subjects[1].given
     confidence = there_and_back(forward.vertex_map, backward.vertex_map, given[0])
+    features = _on_given_rows(here, subjects[0]), _on_given_rows(there, subjects[1])
     made = rule if improver is None else Refined(rule, improver)
-    return Match(*given, forward, backward, confidence, chosen, made, _notes(*subjects), text)
+    return Match(*given, forward, backward, confidence, chosen, made, _notes(*subjects), text, features)
 
 
 match_meshes = match
@@ -102,6 +104,12 @@ def _ways(rule: Matcher, improver: Refiner | None, here: Described, there: Descr
     refined = improver(rule(here, there), here, there)
     backward = refined.backward or improver(rule(there, here), there, here).forward
     return refined.forward, backward, refined.text
+
+
+def _on_given_rows(described: Described, subject: Subject) -> Float32Array:
+    """Return the features of a cleaned mesh at the given vertices, zero for those that were left out."""
+    rows, at = described.features.float().cpu().numpy(), subject.cleaned.vertex_map
+    return np.where(at[:, None] >= 0, rows[at], np.float32(0))
 
 
 def _notes(source: Subject, target: Subject) -> tuple[str, ...]:

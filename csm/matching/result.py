@@ -11,7 +11,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from csm._places import load
-from csm._types import FloatArray, IntArray
+from csm._types import Float32Array, FloatArray, IntArray
 from csm.matching.barycentric import BarycentricMap
 from csm.matching.base import Matcher
 from csm.matching.confidence import Confidence, there_and_back
@@ -43,6 +43,8 @@ class Match:
         What a careful reader should know: what the files, the cleaning, the check and the comparison of both say.
     refinement
         What the refinement did, in words; empty where there was none.
+    features
+        Descriptors of both, shapes (N_source, Q) and (N_target, Q); zero where none was computed.  None if left out.
     """
 
     source: Mesh
@@ -54,6 +56,7 @@ class Match:
     matcher: Matcher
     notes: tuple[str, ...] = ()
     refinement: str = ""
+    features: tuple[Float32Array, Float32Array] | None = None
 
     @property
     def vertex_map(self) -> VertexMap:
@@ -88,7 +91,13 @@ class Match:
         """
         confidence = there_and_back(self.back.vertex_map, self.there.vertex_map, self.target)
         other = replace(
-            self, source=self.target, target=self.source, there=self.back, back=self.there, confidence=confidence
+            self,
+            source=self.target,
+            target=self.source,
+            there=self.back,
+            back=self.there,
+            confidence=confidence,
+            features=None if self.features is None else self.features[::-1],
         )
         other.__dict__["inverse"] = self
         return other

@@ -35,8 +35,9 @@ _RGB = np.array(
 def position_colors(mesh: Mesh, *, up: Axis | Literal["auto"] = "auto") -> Colors:
     """Colour each vertex by where it is, so that neighbours look alike and left, right and the limbs differ.
 
-    Left to right runs from red to green and bottom to top from blue to yellow, by rank, so that a long arm does not
-    leave the torso without contrast; the back is darker than the front.
+    Left to right runs from orange to blue, which people with red-green blindness tell apart as well as others do.
+    Bottom to top runs from dark to light and, for those who see it, from red to green; the back is darker than the
+    front.  Half of each is by rank, so that a long arm does not leave the torso without contrast.
 
     Parameters
     ----------
@@ -51,7 +52,8 @@ def position_colors(mesh: Mesh, *, up: Axis | Literal["auto"] = "auto") -> Color
         Shape (N, 3), uint8.
     """
     right, height, front = (2 * _spread(x) - 1 for x in body_axes(mesh, up) @ mesh.vertices.T)
-    lab = np.stack([0.70 + 0.05 * height + 0.07 * front, -0.19 * right, 0.17 * height], axis=1)
+    side = np.sin(0.5 * np.pi * right)  # steepest in the middle, where left and right are neighbours
+    lab = np.stack([0.69 + 0.13 * height + 0.05 * front, -0.10 * height - 0.02 * side, -0.16 * side], axis=1)
     return _from_oklab(lab)
 
 

@@ -17,13 +17,17 @@ from typing import TypeAlias
 
 from csm.errors import ConfigError
 from csm.mesh.io import atomic_path
+from csm.viewer.block import viewer_block
 from csm.viewer.picture import Picture, png_bytes
-from csm.viewer.scene import Panel, Viewer, viewer_block
+from csm.viewer.scene import Panel, Viewer
 
 __all__ = ["Code", "Figure", "Panel", "Section", "Table", "Text", "Viewer", "report_html", "viewer_html", "write_html"]
 
 _NUMBER = re.compile(r"[-+−]?[\d.,]+(e[-+]?\d+)?( ?± ?[\d.,]+)? ?(%|s|x)?|[-–—]|")
 _CONTENTS_FROM = 4
+_SCRIPTS = (
+    "shaders", "painter", "mesh", "camera", "picking", "colors", "partners", "readout", "marks", "input", "viewer"
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -101,19 +105,48 @@ def report_html(title: str, sections: Sequence[Section], *, lead: str = "", foot
         for i, section in enumerate(sections)
     )
     alive = any(isinstance(block, Viewer) for section in sections for block in section.blocks)
+    header = _header(title, _paragraphs(lead) + _contents(sections))
+    return _page(title, f"{header}<main>\n{body}</main>", footer, alive=alive)
+
+
+def viewer_html(title: str, viewer: Viewer, *, lead: str = "", text: str = "", footer: str = "") -> str:
+    """Write a page with one viewer, which fills the window under the title.
+
+    Parameters
+    ----------
+    title
+        Heading of the page and of its browser tab.
+    viewer
+        The meshes.
+    lead
+        A sentence above the meshes: what the reader should know first.
+    text
+        Paragraphs below them that say what is shown and how it was made.
+    footer
+        Small print.
+    """
+    top = f'<div class="fold">\n{_header(title, _paragraphs(lead))}{viewer_block(viewer)}\n</div>\n'
+    return _page(title, f"<main>\n{top}{_paragraphs(text)}</main>", footer, alive=True)
+
+
+def _page(title: str, body: str, footer: str, *, alive: bool) -> str:
     return Template(_part("page.html")).substitute(
         title=escape(title),
-        lead=_paragraphs(lead) + _contents(sections),
         body=body,
         footer=_inline(footer),
         style=_part("page.css"),
-        script=_part("viewer.js") if alive else "",
+        script=f"<script>\n{_script()}</script>\n" if alive else "",
     )
 
 
-def viewer_html(title: str, viewer: Viewer, *, text: str = "", footer: str = "") -> str:
-    """Write a page with one viewer and, above it, paragraphs that say what is shown and by which protocol."""
-    return report_html(title, [Section("Meshes", [viewer])], lead=text, footer=footer)
+def _header(title: str, below: str) -> str:
+    return f"<header>\n<h1>{escape(title)}</h1>\n{below}</header>\n"
+
+
+def _script() -> str:
+    """Return the parts of the viewer's script as one, with names of their own."""
+    parts = "\n".join(_part(f"{name}.js") for name in _SCRIPTS)
+    return f'(() => {{\n"use strict";\n\n{parts}}})();\n'
 
 
 def write_html(path: str | os.PathLike[str], page: str) -> None:

@@ -114,10 +114,23 @@ def _write_files(match: Match, folder: Path, method: str) -> dict[str, Any]:
 
 def match_page(match: Match, method: str) -> str:
     """Return the page that shows both meshes of a match."""
-    reference = position_colors(match.target)
-    panel = Panel(match.source, pull_colors(reference, match.indices), to_reference=match.indices)
-    viewer = Viewer([panel, Panel(match.target, reference)], reference=1)
-    return viewer_html(f"{match.source.name} → {match.target.name}", viewer, text=_caption(match, method))
+    reference, (here, there) = position_colors(match.target), match.features or (None, None)
+    viewer = Viewer(
+        [
+            Panel(
+                match.source,
+                pull_colors(reference, match.indices),
+                to_reference=match.indices,
+                confidence=match.confidence.values,
+                features=here,
+            ),
+            Panel(match.target, reference, features=there),
+        ],
+        reference=1,
+        confidence_label="confidence in the match; 1 where a vertex returns to its place there and back",
+    )
+    title, verdict = f"{match.source.name} → {match.target.name}", f"{match.confidence.verdict}."
+    return viewer_html(title, viewer, lead=verdict, text=_caption(match, method))
 
 
 def _write_confidence(path: Path, match: Match) -> None:
@@ -129,15 +142,21 @@ def _write_confidence(path: Path, match: Match) -> None:
 
 def _caption(match: Match, method: str) -> str:
     notes = "".join(f"\n\n**Note.** {note}." for note in match.notes)
-    return _what_is_shown(match, method) + f"\n\n{match.confidence.verdict}.{notes}"
+    return _what_is_shown(match, method) + notes
 
 
 def _what_is_shown(match: Match, method: str) -> str:
     return (
-        f"Every vertex of {match.source.name} is mapped to the vertex of {match.target.name} that is nearest in "
-        f"{method}. The target is coloured by position; a source vertex has the colour of its match. "
+        f"Every vertex of {match.source.name} is mapped to a vertex of {match.target.name} by {_made(match, method)}. "
+        "The target is coloured by position; a source vertex has the colour of its match. "
         f"{100 * match.coverage:.1f} % of the target vertices are reached."
     )
+
+
+def _made(match: Match, method: str) -> str:
+    """Say how the map was made: by which neighbour in which descriptor, and what refined it."""
+    rule = match.matcher.name.partition("+")[0]
+    return f"{rule} neighbour in {method}" + (f", {match.refinement}" if match.refinement else "")
 
 
 def _account(match: Match, meaning: str, method: str) -> dict[str, Any]:
@@ -146,7 +165,7 @@ def _account(match: Match, meaning: str, method: str) -> dict[str, Any]:
         "source": _of_mesh(match.source),
         "target": _of_mesh(match.target),
         "map": f"{meaning}; 0-based, -1 for none",
-        "method": f"{match.matcher.name} neighbour in {method}",
+        "method": _made(match, method),
         "unmatched": match.vertex_map.n_unmatched,
         "coverage": match.coverage,
         "returned": match.confidence.returned,

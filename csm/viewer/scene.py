@@ -6,23 +6,22 @@ import base64
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from html import escape
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from csm._types import FloatArray, IntArray
 from csm.errors import ConfigError, MeshError
 from csm.mesh.shape import Mesh
 from csm.viewer.camera import View, body_axes
 from csm.viewer.colors import ERROR_COLORMAP, Colors, scalar_colors
+from csm.viewer.features import compact_features
 
-_RAMP_STOPS = 12
-_HINT = (
-    "Drag to turn, shift-drag to move, click a mesh and scroll to zoom, double-click to start again; or use the arrow "
-    "keys, + and -. Point at a mesh to see where a vertex is mapped: a broken ring lies behind the surface."
-)
+COLORMAPS = {"confidence": "cividis", "errors": ERROR_COLORMAP, "distance": "YlGnBu_r"}
+"""Colour maps of the numbers, all of them monotone in lightness, so that they need no colour vision."""
+
+_SHADES = 128
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +40,16 @@ class Panel:
         Shape (N,): the vertex of the viewer's reference panel that each vertex is mapped to, or -1.
     errors
         Shape (N,): error of each vertex of this mesh; not a number where it is unknown.
+    confidence
+        Shape (N,): from 0 to 1, how far to believe where each vertex is mapped to; not a number where it is unknown.
+    features
+        Shape (N, Q): descriptors of the vertices; not a number where there are none.  The page holds them in the few
+        bytes of `csm.viewer.features.compact_features` and compares vertices by them.
 
     Raises
     ------
     ConfigError
-        If an array has the wrong length.
+        If an array has the wrong length, or a confidence is not between 0 and 1.
     MeshError
         If the mesh cannot be drawn.
     """
@@ -55,18 +59,25 @@ class Panel:
     label: str = ""
     to_reference: IntArray | None = None
     errors: FloatArray | None = None
+    confidence: FloatArray | None = None
+    features: NDArray[np.floating[Any]] | None = None
 
     def __post_init__(self) -> None:
         n = self.mesh.n_vertices
+        columns = 0 if self.features is None else self.features.shape[-1]
         if self.mesh.n_faces == 0 or not np.isfinite(self.mesh.vertices).all():
             raise MeshError(f"{self.mesh.label}: a page can show only meshes with faces and finite coordinates")
         for what, array, wanted in (
             ("colours", self.colors, (n, 3)),
             ("the map", self.to_reference, (n,)),
             ("errors", self.errors, (n,)),
+            ("confidences", self.confidence, (n,)),
+            ("features", self.features, (n, columns)),
         ):
             if array is not None and np.shape(array) != wanted:
                 raise ConfigError(f"{self.mesh.label}: {what} have shape {np.shape(array)}, wanted {wanted}")
+        if self.confidence is not None and ((self.confidence < 0) | (self.confidence > 1)).any():
+            raise ConfigError(f"{self.mesh.label}: a confidence is not between 0 and 1")
 
     @property
     def title(self) -> str:
@@ -81,7 +92,7 @@ class Viewer:
     Parameters
     ----------
     panels
-        One or more, shown from left to right.
+        One or more, shown from left to right.  All or none of them have features.
     reference
         Position of the panel that the maps of the others go to.  A source and a target that it is mapped to are
         ``Viewer([source, target], reference=1)``.
@@ -91,13 +102,15 @@ class Viewer:
         What the errors are, with their unit, such as "geodesic error, fraction of the diameter".
     error_high
         Error that gets the last colour; by default the 98th percentile of all errors.
+    confidence_label
+        What the confidences are.
     caption
         Text below the meshes.
 
     Raises
     ------
     ConfigError
-        If there is no such reference panel or a map leaves the reference mesh.
+        If there is no such reference panel, a map leaves the reference mesh, or features cannot be compared.
     """
 
     panels: Sequence[Panel]
@@ -105,6 +118,7 @@ class Viewer:
     view: View = field(default_factory=lambda: View(up="auto"))
     error_label: str = "error"
     error_high: float | None = None
+    confidence_label: str = "confidence in the match"
     caption: str = ""
 
     def __post_init__(self) -> None:
@@ -115,15 +129,32 @@ class Viewer:
             indices = panel.to_reference
             if indices is not None and (np.min(indices, initial=0) < -1 or np.max(indices, initial=0) >= n):
                 raise ConfigError(f"{panel.title}: its map leaves the reference mesh, which has vertices 0..{n - 1}")
+        columns = [None if p.features is None else np.shape(p.features)[1] for p in self.panels]
+        if len(set(columns)) > 1:
+            raise ConfigError(f"viewer: its meshes have features of {columns} columns, wanted the same for all of them")
 
     @property
     def top_error(self) -> float | None:
         """Error that gets the last colour, or None if no panel has a known error."""
-        given = [np.asarray(p.errors)[np.isfinite(p.errors)] for p in self.panels if p.errors is not None]
-        known = np.concatenate(given) if given else np.zeros(0)
+        known = _finite([p.errors for p in self.panels])
         if known.size == 0:
             return None
         return self.error_high if self.error_high is not None else float(np.percentile(known, 98))
+
+    @property
+    def scales(self) -> dict[str, float | None]:
+        """Which numbers there are, in the order of `COLORMAPS`, and the one of the last colour; None if it varies."""
+        known = {
+            "confidence": 1.0 if _finite([p.confidence for p in self.panels]).size else None,
+            "errors": self.top_error,
+        }
+        found: dict[str, float | None] = {name: high for name, high in known.items() if high is not None}
+        return found if self.panels[0].features is None else {**found, "distance": None}
+
+
+def _finite(arrays: Sequence[FloatArray | None]) -> FloatArray:
+    given = [np.asarray(a, dtype=np.float64) for a in arrays if a is not None]
+    return np.concatenate([a[np.isfinite(a)] for a in given]) if given else np.zeros(0)
 
 
 def pack(array: ArrayLike, kind: str) -> str:
@@ -131,30 +162,31 @@ def pack(array: ArrayLike, kind: str) -> str:
     return base64.b64encode(np.ascontiguousarray(array, dtype=f"<{kind}").tobytes()).decode("ascii")
 
 
+def ramp(name: str, shades: int = _SHADES) -> Colors:
+    """Return the colours of a scale from its first to its last, shape (shades, 3)."""
+    return scalar_colors(np.linspace(0, 1, shades), colormap=COLORMAPS[name])
+
+
 def scene_json(viewer: Viewer) -> str:
     """Write a viewer as json that can stand inside a script element whatever the names are."""
-    scene = {
+    scene: dict[str, Any] = {
         "reference": viewer.reference,
         "view": {"azimuth": viewer.view.azimuth, "elevation": viewer.view.elevation},
+        "scales": {name: {"high": high, "ramp": pack(ramp(name), "u1")} for name, high in viewer.scales.items()},
         "panels": [_panel_data(panel, viewer) for panel in viewer.panels],
     }
+    features = [panel.features for panel in viewer.panels if panel.features is not None]
+    if features:
+        compact = compact_features(features)
+        scene["steps"] = compact.steps.tolist()
+        for data, codes in zip(scene["panels"], compact.codes, strict=True):
+            data["features"] = pack(codes, "i1")
     text = json.dumps(scene, allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
-def viewer_block(viewer: Viewer) -> str:
-    """Write the html of a viewer; the page's script brings it to life."""
-    panels = "\n".join(_panel_html(panel) for panel in viewer.panels)
-    caption = f"<p>{escape(viewer.caption)}</p>\n" if viewer.caption else ""
-    return (
-        f'<div class="viewer">\n<div class="bar">{_controls(viewer)}</div>\n<div class="panels">\n{panels}\n</div>\n'
-        f'<p class="readout" aria-live="polite"></p>\n{caption}<p class="hint">{escape(_HINT)}</p>\n'
-        f'<script type="application/json">{scene_json(viewer)}</script>\n</div>'
-    )
-
-
 def _panel_data(panel: Panel, viewer: Viewer) -> dict[str, Any]:
-    mesh, top = panel.mesh, viewer.top_error
+    mesh = panel.mesh
     wide = mesh.n_vertices > 65536
     data: dict[str, Any] = {
         "label": panel.title,
@@ -166,36 +198,7 @@ def _panel_data(panel: Panel, viewer: Viewer) -> dict[str, Any]:
     }
     if panel.to_reference is not None:
         data["map"] = pack(panel.to_reference, "i4")
-    if panel.errors is not None and top is not None:
-        data["errors"] = pack(panel.errors, "f4")
-        data["errorColors"] = pack(scalar_colors(panel.errors, colormap=ERROR_COLORMAP, low=0.0, high=top), "u1")
+    for name, values in (("confidence", panel.confidence), ("errors", panel.errors)):
+        if values is not None and name in viewer.scales:
+            data[name] = pack(values, "f4")
     return data
-
-
-def _panel_html(panel: Panel) -> str:
-    title = escape(panel.title)
-    return (
-        f'<div class="panel"><p>{title} <small>{panel.mesh.n_vertices:,} vertices</small></p>'
-        f'<canvas tabindex="0" role="img" aria-label="{title}, a mesh that can be turned"></canvas></div>'
-    )
-
-
-def _controls(viewer: Viewer) -> str:
-    top = viewer.top_error
-    modes = [("matched", "Colours"), *([("errors", "Errors")] if top is not None else []), ("plain", "Shape")]
-    buttons = "".join(f'<button type="button" data-mode="{mode}">{text}</button>' for mode, text in modes)
-    scale = "" if top is None else _error_scale(viewer.error_label, top)
-    return (
-        f'<span class="modes" role="group" aria-label="What the colours show">{buttons}</span>'
-        f'<button type="button" class="reset">Front view</button>{scale}'
-    )
-
-
-def _error_scale(label: str, top: float) -> str:
-    ramp = scalar_colors(np.linspace(0, 1, _RAMP_STOPS), colormap=ERROR_COLORMAP)
-    stops = ", ".join(f"rgb({r}, {g}, {b})" for r, g, b in ramp.tolist())
-    return (
-        '<span class="scale" hidden>0 '
-        f'<span class="ramp" style="background: linear-gradient(to right, {stops})"></span> '
-        f"{top:.3g} and more: {escape(label)}; grey is unknown</span>"
-    )

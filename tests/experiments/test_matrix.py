@@ -73,6 +73,7 @@ def test_a_matrix_is_trained_tested_averaged_and_resumed_cell_by_cell(bench):
     names = {path.name for path in bench.place().iterdir()}
     assert {"model.ckpt", "row.json", "toys_edge_diameter.json", "toys_edge_diameter_argmax.json"} <= names
     assert "toys_edge_diameter.cqc.csv" in names
+    assert "the worst pair" in (bench.place() / "toys_edge_diameter_argmax.html").read_text(encoding="utf-8")
     assert bench.fill(rows, matching=("nearest", "argmax"), table="mine") == table
     assert (bench.trained, bench.tested) == ([], [])
 

@@ -6,12 +6,14 @@ import base64
 import io
 import re
 from html.parser import HTMLParser
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from csm.data.humans import load_humans
 from csm.errors import ConfigError
 from csm.viewer.colors import position_colors
 from csm.viewer.html import Code, Figure, Panel, Section, Table, Text, Viewer, report_html, viewer_html, write_html
@@ -68,7 +70,8 @@ def test_page_is_well_formed_html() -> None:
 
 def test_page_asks_for_nothing_from_anywhere() -> None:
     html = a_page()
-    assert not re.search(r"https?:|//[a-z]|@import|url\(", html.split("<script>")[0])
+    written = re.sub(r'<script type="application/json">.*?</script>', "", html.split("<script>")[0])
+    assert not re.search(r"https?:|//[a-z]|@import|url\(", written)
     assert not re.search(r"https?:|\bfetch\b|XMLHttpRequest|import\(|WebSocket|sendBeacon", html)
     for _, attributes in Page(html).tags:
         for name in ("src", "href", "action", "srcset", "poster"):
@@ -121,6 +124,28 @@ def test_only_a_page_with_meshes_has_a_script() -> None:
     assert len(page.attributes("canvas")) == 1
     assert page.attributes("script") == [{"type": "application/json"}, {}]
     assert "protocol: all pairs" in page.text["p"]
+
+
+def test_a_page_of_meshes_says_the_most_important_first_and_the_rest_below_them() -> None:
+    page = viewer_html("t", a_viewer(), lead="Most of it is wrong.", text="How it was made.")
+    assert page.index("Most of it is wrong.") < page.index("<canvas") < page.index("How it was made.")
+
+
+def test_page_of_two_usual_meshes_with_everything_is_small() -> None:
+    body = load_humans().mesh("s00_p00")
+    assert body.n_vertices > 6500
+    rng, n = np.random.default_rng(0), body.n_vertices
+    values, features = rng.random(n), rng.normal(size=(n, 300))
+    panel = Panel(body, position_colors(body), "source", rng.permutation(n), values, values, features)
+    page = viewer_html("t", Viewer([panel, Panel(body, position_colors(body), features=features)], reference=1))
+    assert len(page.encode()) < 2e6
+
+
+def test_every_part_of_the_script_is_in_the_page() -> None:
+    page = viewer_html("t", a_viewer())
+    parts = [p for p in (files("csm.viewer") / "web").iterdir() if p.name.endswith(".js")]
+    assert len(parts) > 5
+    assert [p.name for p in parts if page.count(p.read_text(encoding="utf-8")) != 1] == []
 
 
 def test_long_pages_have_contents_and_short_ones_do_not() -> None:

@@ -1,6 +1,11 @@
+"""What a match leaves in a folder: its files and account, and a page that shows how far to believe it."""
+
 from __future__ import annotations
 
 import json
+import re
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,11 +16,12 @@ from csm.matching import PrecomputedMethod
 from csm.mesh.io import read_mesh
 from csm.viewer.match_folder import ACCOUNT, FILES, in_words, match_page, save_match, write_match
 from tests.shapes import blob
+from tests.viewer.test_scene import unpack
 
 
 @pytest.fixture(scope="module")
 def match(tmp_path_factory) -> csm.Match:
-    return csm.match(blob(2), blob(1), "gps", store=tmp_path_factory.mktemp("store"))
+    return csm.match(blob(2), blob(1), "gps", refine="none", store=tmp_path_factory.mktemp("store"))
 
 
 def test_the_folder_holds_the_map_and_how_it_was_made(match, tmp_path):
@@ -54,5 +60,34 @@ def test_the_page_has_both_names_and_the_verdict(match):
 
 def test_methods_of_other_kinds_are_called_by_their_name(match):
     features = PrecomputedMethod({"blob": np.random.default_rng(0).random((162, 3))}, "mine")
-    other = csm.match(blob(2), blob(2), features)
+    other = csm.match(blob(2), blob(2), features, refine="none")
     assert in_words(other) == "the descriptor mine"
+
+
+def scene_of(page: str) -> dict[str, Any]:
+    (scene,) = re.findall(r'<script type="application/json">(.*?)</script>', page)
+    found: dict[str, Any] = json.loads(scene)
+    return found
+
+
+def test_the_page_has_the_map_its_confidence_and_its_verdict(match: csm.Match, tmp_path: Path) -> None:
+    write_match(match, tmp_path, "GPS", 1.0)
+    assert {path.name for path in tmp_path.iterdir()} == {*FILES, ACCOUNT}
+    page = (tmp_path / "match.html").read_text(encoding="utf-8")
+    source, target = scene_of(page)["panels"]
+    np.testing.assert_array_equal(unpack(source["map"], "i4"), match.indices)
+    np.testing.assert_allclose(unpack(source["confidence"], "f4"), match.confidence.values, atol=1e-6)
+    assert "confidence" not in target
+    assert 'data-mode="distance"' not in page
+    assert page.index(match.confidence.verdict[:20]) < page.index("<canvas") < page.index("is mapped to the vertex of")
+
+
+def test_descriptors_that_are_given_can_be_compared_in_the_page(match: csm.Match, tmp_path: Path) -> None:
+    features = match.source.vertices, match.target.vertices
+    write_match(match, tmp_path, "HKS", 1.0, features=features)
+    page = (tmp_path / "match.html").read_text(encoding="utf-8")
+    assert 'data-mode="distance"' in page
+    scene = scene_of(page)
+    here, there = (unpack(p["features"], "i1").reshape(-1, 3) * np.array(scene["steps"]) for p in scene["panels"])
+    exact = np.linalg.norm(features[0][5] - features[1], axis=1)
+    np.testing.assert_allclose(np.linalg.norm(here[5] - there, axis=1), exact, atol=0.05)

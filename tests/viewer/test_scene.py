@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import base64
 import json
-import re
-from html.parser import HTMLParser
-from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -15,10 +12,8 @@ from csm.errors import ConfigError, MeshError
 from csm.mesh.shape import Mesh
 from csm.viewer.camera import View
 from csm.viewer.colors import position_colors, pull_colors
-from csm.viewer.scene import Panel, Viewer, pack, scene_json, viewer_block
+from csm.viewer.scene import Panel, Viewer, pack, scene_json
 from tests.shapes import blob, sphere
-
-NASTY = "</script><script>alert('1 & \"2\"')</script><!--"
 
 
 def a_pair(label: str = "source") -> Viewer:
@@ -28,9 +23,10 @@ def a_pair(label: str = "source") -> Viewer:
     errors = np.linspace(0, 0.5, source.n_vertices)
     errors[3] = np.nan
     reference = position_colors(target)
-    return Viewer(
-        [Panel(source, pull_colors(reference, indices), label, indices, errors), Panel(target, reference)], reference=1
+    first = Panel(
+        source, pull_colors(reference, indices), label, indices, errors, errors * 2, np.tile(source.vertices, 2)
     )
+    return Viewer([first, Panel(target, reference, features=np.tile(target.vertices, 2))], reference=1)
 
 
 def unpack(text: str, kind: str) -> np.ndarray:
@@ -71,52 +67,43 @@ def test_largest_short_index_fits_and_the_next_vertex_makes_them_wide() -> None:
         np.testing.assert_array_equal(unpack(data["faces"], "u4" if wide else "u2"), [0, 1, n - 1])
 
 
-def test_error_colours_run_from_pale_to_dark_and_unknown_is_grey() -> None:
+def test_scales_run_from_one_lightness_to_the_other_and_end_at_the_top_error() -> None:
     viewer = a_pair()
-    data = json.loads(scene_json(viewer))["panels"][0]
-    colors = unpack(data["errorColors"], "u1").reshape(-1, 3).astype(int)
-    assert (colors[3] == colors[3, 0]).all()
-    known = np.delete(colors, 3, axis=0) @ [0.2126, 0.7152, 0.0722]
-    assert (np.diff(known) <= 1).all()
-    assert known[0] > known[-1] + 100
-    assert viewer.top_error == pytest.approx(np.nanpercentile(viewer.panels[0].errors, 98))
+    scales = json.loads(scene_json(viewer))["scales"]
+    assert list(scales) == ["confidence", "errors", "distance"]
+    for scale in scales.values():
+        lightness = unpack(scale["ramp"], "u1").reshape(-1, 3) @ [0.2126, 0.7152, 0.0722]
+        assert (np.diff(lightness) <= 1).all() or (np.diff(lightness) >= -1).all()
+        assert abs(lightness[0] - lightness[-1]) > 100
+    assert scales["errors"]["high"] == viewer.top_error == pytest.approx(np.nanpercentile(viewer.panels[0].errors, 98))
+    assert scales["confidence"]["high"] == 1
+    assert scales["distance"]["high"] is None
     assert Viewer(viewer.panels, reference=1, error_high=0.2).top_error == 0.2
 
 
-def test_without_errors_there_is_no_error_scale() -> None:
+def test_scene_holds_confidences_and_compact_features() -> None:
+    viewer = a_pair()
+    scene = json.loads(scene_json(viewer))
+    np.testing.assert_allclose(unpack(scene["panels"][0]["confidence"], "f4"), viewer.panels[0].confidence, rtol=1e-6)
+    assert "confidence" not in scene["panels"][1]
+    steps = np.array(scene["steps"])
+    codes = [unpack(data["features"], "i1").reshape(-1, len(steps)).astype(float) for data in scene["panels"]]
+    features = [panel.features for panel in viewer.panels]
+    np.testing.assert_allclose(
+        np.linalg.norm((codes[0][:20, None] - codes[1]) * steps, axis=2),
+        np.linalg.norm(features[0][:20, None] - features[1], axis=2),
+        atol=0.1,
+    )
+
+
+def test_without_numbers_there_are_no_scales() -> None:
     source = sphere(1)
-    for errors in (None, np.full(source.n_vertices, np.nan)):
-        viewer = Viewer([Panel(source, position_colors(source), errors=errors)])
+    for unknown in (None, np.full(source.n_vertices, np.nan)):
+        viewer = Viewer([Panel(source, position_colors(source), errors=unknown, confidence=unknown)])
         assert viewer.top_error is None
-        block = viewer_block(viewer)
-        assert 'data-mode="errors"' not in block
-        assert 'class="scale"' not in block
-
-
-def test_names_cannot_break_out_of_their_place() -> None:
-    viewer = Viewer(a_pair(NASTY).panels, reference=1, caption=NASTY, error_label=NASTY)
-    block = viewer_block(viewer)
-    assert "<script>" not in block
-    assert "<!--" not in block
-    assert block.count("</script") == 1
-    found = _Collector.read(block)
-    assert [tag for tag in found.tags if tag == "script"] == ["script"]
-    assert json.loads(found.script)["panels"][0]["label"] == NASTY
-    assert found.text.count(NASTY) == 3  # heading, caption and scale
-    assert f"{NASTY}, a mesh that can be turned" in found.labels
-
-
-def test_script_finds_every_part_that_it_looks_for() -> None:
-    script = (files("csm.viewer") / "web" / "viewer.js").read_text(encoding="utf-8")
-    wanted = set(re.findall(r'root\.querySelector(?:All)?\("([^"]+)"\)', script))
-    assert wanted == {"script", "canvas", ".readout", ".reset", ".scale", "[data-mode]"}
-    block = viewer_block(a_pair())
-    for selector in wanted:
-        sign = {".": f'class="{selector[1:]}"', "[": selector[1:-1] + "="}.get(selector[0], f"<{selector}")
-        assert sign in block
-    assert block.count("<canvas") == 2
-    read = set(re.findall(r"\bdata\.(\w+)", script))
-    assert read == set().union(*json.loads(scene_json(a_pair()))["panels"])
+        assert viewer.scales == {}
+        data = json.loads(scene_json(viewer))["panels"][0]
+        assert not {"errors", "confidence", "features"} & data.keys()
 
 
 def test_view_of_the_viewer_is_the_view_of_the_page() -> None:
@@ -135,36 +122,17 @@ def test_what_does_not_fit_together_is_refused() -> None:
         Panel(mesh, colors, to_reference=np.zeros(3, dtype=np.int64))
     with pytest.raises(ConfigError, match="errors"):
         Panel(mesh, colors, errors=np.zeros(3))
+    with pytest.raises(ConfigError, match="confidences have shape"):
+        Panel(mesh, colors, confidence=np.zeros(3))
+    with pytest.raises(ConfigError, match="not between 0 and 1"):
+        Panel(mesh, colors, confidence=np.full(mesh.n_vertices, 1.5))
+    with pytest.raises(ConfigError, match="features have shape"):
+        Panel(mesh, colors, features=np.zeros((3, 2)))
+    with pytest.raises(ConfigError, match="the same for all"):
+        Viewer([Panel(mesh, colors), Panel(mesh, colors, features=np.zeros((mesh.n_vertices, 2)))])
     with pytest.raises(MeshError, match="faces"):
         Panel(Mesh(mesh.vertices, np.zeros((0, 3))), colors)
     with pytest.raises(ConfigError, match="reference panel 1"):
         Viewer([Panel(mesh, colors)], reference=1)
     with pytest.raises(ConfigError, match="leaves the reference mesh"):
         Viewer([Panel(mesh, colors), Panel(mesh, colors, to_reference=np.full(mesh.n_vertices, 42))])
-
-
-class _Collector(HTMLParser):
-    """Text, tags, labels and the script of a piece of html."""
-
-    def __init__(self) -> None:
-        super().__init__(convert_charrefs=True)
-        self.tags: list[str] = []
-        self.labels: list[str] = []
-        self.text = self.script = ""
-
-    @classmethod
-    def read(cls, html: str) -> _Collector:
-        parser = cls()
-        parser.feed(html)
-        parser.close()
-        return parser
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append(tag)
-        self.labels += [value or "" for name, value in attrs if name == "aria-label"]
-
-    def handle_data(self, data: str) -> None:
-        if self.tags[-1] == "script" and not self.script:
-            self.script = data
-        else:
-            self.text += data
