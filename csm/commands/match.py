@@ -15,7 +15,7 @@ from csm.commands.outputs import require_new_in_sweep, require_not_input, requir
 from csm.data.store import Store
 from csm.errors import ConfigError
 from csm.matching import DescriptorMethod, Method, match_meshes
-from csm.viewer.match_folder import ACCOUNT, FILES, write_match
+from csm.viewer.match_folder import ACCOUNT, FILES, made_by, write_match
 
 register("descriptor")
 
@@ -28,16 +28,26 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     folder = Path(cfg.out or f"{Path(cfg.source).stem}_to_{Path(cfg.target).stem}")
     _require_place(folder, [Path(cfg.source), Path(cfg.target)], cfg.overwrite)
     method, text = _method(cfg)
-    match = match_meshes(cfg.source, cfg.target, method, clean=cfg.clean, store=Store(cfg.store), device=cfg.device)
+    match = match_meshes(
+        cfg.source,
+        cfg.target,
+        method,
+        cfg.matching,
+        cfg.refine,
+        clean=cfg.clean,
+        store=Store(cfg.store),
+        device=cfg.device,
+    )
     write_match(match, folder, text, time.perf_counter() - begun)
     for note in match.notes:
         print(f"note: {note}")
-    unmatched = f"{match.vertex_map.n_unmatched} of them without a partner; " if match.vertex_map.n_unmatched else ""
+    source, target, unmatched = match.source, match.target, match.vertex_map.n_unmatched
     print(
-        f"{match.source.name} ({match.source.n_vertices} vertices) -> {match.target.name} "
-        f"({match.target.n_vertices} vertices) by {text}: {unmatched}{100 * match.coverage:.1f} % of the target's "
-        f"vertices are reached\n{match.confidence.verdict}\n{folder}: map.txt, match.html (to look at), match.json "
-        "(how it was made)"
+        f"{source.name} ({source.n_vertices} vertices) -> {target.name} ({target.n_vertices} vertices) by "
+        f"{made_by(match, text)}\n"
+        + (f"{unmatched} vertices have no partner; " if unmatched else "")
+        + f"{100 * match.coverage:.1f} % of the target's vertices are reached\n{match.confidence.verdict}\n"
+        f"{folder}: map.txt, match.html (to look at), match.json (how it was made)"
     )
     return {"coverage": match.coverage, "returned": match.confidence.returned, "vertices": match.source.n_vertices}
 
@@ -57,7 +67,9 @@ def _method(cfg: DictConfig) -> tuple[Method, str]:
         return DescriptorMethod(descriptor), f"the descriptor {descriptor}"
     from csm.matching.network import load_model
 
-    return load_model(cfg.checkpoint), f"the learned descriptor of {Path(cfg.checkpoint).name}"
+    network = load_model(cfg.checkpoint)
+    trained = f" (trained on {network.trained_on})" if network.trained_on else ""
+    return network, f"the learned descriptor of {Path(cfg.checkpoint).name}{trained}"
 
 
 main = command("match")(run)

@@ -115,12 +115,15 @@ class Described:
         Over the template points, if the method is a network that has one.
     store
         Where eigenpairs are looked up and kept; without one they are computed.
+    given
+        Shape (N, Q'): the handcrafted descriptor that a network was given; None for other methods.
     """
 
     mesh: Mesh
     features: Tensor
     classifier: Classifier | None = None
     store: Store | None = None
+    given: Tensor | None = None
 
     def __repr__(self) -> str:
         return f"Described({self.mesh!r}, {self.features.shape[1]} features)"

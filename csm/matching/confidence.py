@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from torch import Tensor
 
 from csm._types import FloatArray
+from csm.matching.embedded import farthest_points
 from csm.matching.maps import VertexMap
+from csm.matching.nearest import nearest
 from csm.mesh.debris import body_of
 from csm.mesh.shape import Mesh
 
@@ -68,3 +71,26 @@ def there_and_back(forward: VertexMap, backward: VertexMap, source: Mesh) -> Con
     back = np.where(there >= 0, backward.indices[there], -1)
     away = np.linalg.norm(source.vertices[back] - source.vertices, axis=1) / np.sqrt(body_of(source).area)
     return Confidence(np.where(back >= 0, away, np.inf))
+
+
+def share_returning(source: Mesh, here: Tensor, there: Tensor, *, samples: int = 1000) -> float:
+    """Return how many nearest neighbours return to within `NEAR` on the way there and back, by descriptors alone.
+
+    Parameters
+    ----------
+    source
+        N_source vertices.
+    here, there
+        Descriptors of both shapes, (N_source, Q) and (N_target, Q).
+    samples
+        Vertices that are tried, spread over the source.
+
+    Returns
+    -------
+    float
+        A fraction of the tried vertices.
+    """
+    at = farthest_points(source.vertices, samples)
+    back = nearest(there[nearest(here[at], there)], here)
+    away = np.linalg.norm(source.vertices[back] - source.vertices[at], axis=1)
+    return float((away < NEAR * np.sqrt(body_of(source).area)).mean())

@@ -10,7 +10,7 @@ from csm._types import Float32Array
 from csm.data.store import Store
 from csm.descriptors.base import Descriptor
 from csm.matching.base import Described, Matcher, require_device
-from csm.matching.confidence import there_and_back
+from csm.matching.confidence import share_returning, there_and_back
 from csm.matching.maps import VertexMap
 from csm.matching.methods import Method, PrecomputedMethod, as_method
 from csm.matching.nearest import Rows, nearest
@@ -90,8 +90,11 @@ def match(
     confidence = there_and_back(forward.vertex_map, backward.vertex_map, given[0])
     features = _on_given_rows(here, subjects[0]), _on_given_rows(there, subjects[1])
     made = rule if improver is None else Refined(rule, improver)
-    return Match(*given, forward, backward, confidence, chosen, made, _notes(*subjects), text, features)
+    notes = (*_notes(*subjects), *_against_input(here, there))
+    return Match(*given, forward, backward, confidence, chosen, made, notes, text, features)
 
+
+_CLEARLY = 0.1  # more of the vertices return
 
 match_meshes = match
 """The name of `match` in the first release."""
@@ -104,6 +107,21 @@ def _ways(rule: Matcher, improver: Refiner | None, here: Described, there: Descr
     refined = improver(rule(here, there), here, there)
     backward = refined.backward or improver(rule(there, here), there, here).forward
     return refined.forward, backward, refined.text
+
+
+def _against_input(here: Described, there: Described) -> list[str]:
+    """Say it where the descriptor that a network was given agrees better with itself than the learned one."""
+    if here.given is None or there.given is None:
+        return []
+    learned = share_returning(here.mesh, here.features, there.features)
+    plain = share_returning(here.mesh, here.given, there.given)
+    if plain < learned + _CLEARLY:
+        return []
+    return [
+        f"the network may not know such shapes: of its descriptor's nearest neighbours {100 * learned:.0f} % return to "
+        f"their place on the way there and back, of those of the descriptor that it was given {100 * plain:.0f} %; try "
+        "without the checkpoint"
+    ]
 
 
 def _on_given_rows(described: Described, subject: Subject) -> Float32Array:

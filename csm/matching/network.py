@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
+import torch
+
 from csm.data.prepare import Recipe, prepare_mesh
 from csm.data.store import Store
 from csm.learning.checkpoint import load_module
@@ -37,6 +39,12 @@ class NetworkMethod(Method):
     def __repr__(self) -> str:
         return f"NetworkMethod({self.name!r}, {self.module.hparams['network']['name']})"
 
+    @property
+    def trained_on(self) -> str:
+        """What it was trained on, in words; empty where the checkpoint does not say."""
+        known, epochs = self.training.get("set"), self.training.get("epochs")
+        return f"{known}, {epochs} epochs" if known and epochs else str(known or "")
+
     @cached_property
     def key(self) -> Mapping[str, Any]:
         """Network, input, and the hash of the weights."""
@@ -55,12 +63,13 @@ class NetworkMethod(Method):
     def describe(self, mesh: Mesh, store: Store, device: str = "cpu") -> Described:
         """Return the learned descriptor of a mesh, computed on the device."""
         self.module.to(device)
-        features = self.module.describe(network_input(prepare_mesh(mesh, self.recipe, store)))
+        prepared = prepare_mesh(mesh, self.recipe, store)
+        features = self.module.describe(network_input(prepared))
         classifier = None
         if self.module.has_classifier:
             linear = self.module.network.classifier
             classifier = Classifier(linear.weight.detach(), linear.bias.detach())
-        return Described(mesh, features, classifier, store)
+        return Described(mesh, features, classifier, store, torch.from_numpy(prepared.features).to(features.device))
 
 
 def load_model(path: str | os.PathLike[str], name: str = "") -> NetworkMethod:

@@ -146,14 +146,15 @@ def _caption(match: Match, method: str) -> str:
 
 
 def _what_is_shown(match: Match, method: str) -> str:
+    source, target = match.source.name, match.target.name
     return (
-        f"Every vertex of {match.source.name} is mapped to a vertex of {match.target.name} by {_made(match, method)}. "
+        f"Every vertex of {source} is mapped to a vertex of {target} by {made_by(match, method)}. "
         "The target is coloured by position; a source vertex has the colour of its match. "
         f"{100 * match.coverage:.1f} % of the target vertices are reached."
     )
 
 
-def _made(match: Match, method: str) -> str:
+def made_by(match: Match, method: str) -> str:
     """Say how the map was made: by which neighbour in which descriptor, and what refined it."""
     rule = match.matcher.name.partition("+")[0]
     return f"{rule} neighbour in {method}" + (f", {match.refinement}" if match.refinement else "")
@@ -165,7 +166,7 @@ def _account(match: Match, meaning: str, method: str) -> dict[str, Any]:
         "source": _of_mesh(match.source),
         "target": _of_mesh(match.target),
         "map": f"{meaning}; 0-based, -1 for none",
-        "method": _made(match, method),
+        "method": made_by(match, method),
         "unmatched": match.vertex_map.n_unmatched,
         "coverage": match.coverage,
         "returned": match.confidence.returned,

@@ -25,7 +25,7 @@ def meshes() -> tuple[Mesh, Mesh]:
 
 
 def test_a_turned_and_scaled_copy_is_matched_without_error(meshes, tmp_path):
-    match = csm.match(*meshes, CHEAP, store=Store(tmp_path))
+    match = csm.match(*meshes, CHEAP, refine="none", store=Store(tmp_path))
     np.testing.assert_array_equal(match.indices, np.arange(162))
     assert match.coverage == 1.0
     assert (match.source, match.target) == meshes
@@ -37,18 +37,18 @@ def test_files_presets_methods_and_matchers_are_taken(meshes, tmp_path):
     for mesh in meshes:
         write_mesh(tmp_path / f"{mesh.name}.off", mesh)
     paths, store = [tmp_path / f"{mesh.name}.off" for mesh in meshes], Store(tmp_path / "store")
-    match = csm.match(str(paths[0]), paths[1], DescriptorMethod(CHEAP, "mine"), Nearest(), store=store)
+    match = csm.match(str(paths[0]), paths[1], DescriptorMethod(CHEAP, "mine"), Nearest(), refine="none", store=store)
     assert (match.method.name, match.matcher, match.target.name) == ("mine", Nearest(), "turned")
     assert (match.indices == np.arange(162)).mean() > 0.99
-    assert csm.match(paths[0], meshes[0], "xyz", store=store).coverage == 1.0
+    assert csm.match(paths[0], meshes[0], "xyz", refine="none", store=store).coverage == 1.0
 
 
 def test_all_kinds_of_meshes_are_taken_and_named(meshes, tmp_path):
     store = Store(tmp_path)
-    wanted = csm.match(*meshes, CHEAP, store=store).indices
+    wanted = csm.match(*meshes, CHEAP, refine="none", store=store).indices
     pair = (torch.as_tensor(meshes[0].vertices.copy()), meshes[0].faces.tolist())
     other = trimesh.Trimesh(meshes[1].vertices, meshes[1].faces, process=False)
-    match = csm.match(pair, other, CHEAP, store=store)
+    match = csm.match(pair, other, CHEAP, refine="none", store=store)
     np.testing.assert_array_equal(match.indices, wanted)
     assert repr(match) == "Match(source -> target by hks, nearest)"
 
@@ -59,22 +59,27 @@ def test_the_old_name_still_does_the_same():
 
 def test_everything_that_the_store_lacks_is_kept_in_it(meshes, tmp_path):
     store = Store(tmp_path)
-    csm.match(*meshes, CHEAP, store=store)
+    csm.match(*meshes, CHEAP, refine="none", store=store)
     assert store.computed == 2
-    csm.match(*meshes, CHEAP, store=store)
+    csm.match(*meshes, CHEAP, refine="none", store=store)
     assert store.computed == 2
 
 
 def test_what_cannot_be_matched_is_named(meshes, tmp_path):
     store = Store(tmp_path)
     with pytest.raises(ConfigError, match="nearest or argmax"):
-        csm.match(*meshes, CHEAP, "votes", store=store)
+        csm.match(*meshes, CHEAP, "votes", refine="none", store=store)
     with pytest.raises(ConfigError, match="needs a trained network"):
-        csm.match(*meshes, CHEAP, "argmax", store=store)
+        csm.match(*meshes, CHEAP, "argmax", refine="none", store=store)
     with pytest.raises(MeshError, match=r"gone\.off"):
-        csm.match(tmp_path / "gone.off", meshes[1], CHEAP, store=store)
+        csm.match(tmp_path / "gone.off", meshes[1], CHEAP, refine="none", store=store)
     with pytest.raises(ConfigError, match="not finite"):
-        csm.match(*meshes, PrecomputedMethod({m.name: torch.full((162, 1), torch.nan) for m in meshes}), store=store)
+        csm.match(
+            *meshes,
+            PrecomputedMethod({m.name: torch.full((162, 1), torch.nan) for m in meshes}),
+            refine="none",
+            store=store,
+        )
 
 
 def test_features_are_matched_as_they_are():

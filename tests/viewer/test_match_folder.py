@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -78,13 +79,16 @@ def test_the_page_has_the_map_its_confidence_and_its_verdict(match: csm.Match, t
     np.testing.assert_array_equal(unpack(source["map"], "i4"), match.indices)
     np.testing.assert_allclose(unpack(source["confidence"], "f4"), match.confidence.values, atol=1e-6)
     assert "confidence" not in target
-    assert 'data-mode="distance"' not in page
-    assert page.index(match.confidence.verdict[:20]) < page.index("<canvas") < page.index("is mapped to the vertex of")
+    assert page.index(match.confidence.verdict[:20]) < page.index("<canvas") < page.index("is mapped to a vertex of")
 
 
-def test_descriptors_that_are_given_can_be_compared_in_the_page(match: csm.Match, tmp_path: Path) -> None:
+def test_without_descriptors_they_cannot_be_compared_in_the_page(match: csm.Match) -> None:
+    assert 'data-mode="distance"' not in match_page(replace(match, features=None), "GPS")
+
+
+def test_descriptors_can_be_compared_in_the_page(match: csm.Match, tmp_path: Path) -> None:
     features = match.source.vertices, match.target.vertices
-    write_match(match, tmp_path, "HKS", 1.0, features=features)
+    write_match(replace(match, features=features), tmp_path, "HKS", 1.0)
     page = (tmp_path / "match.html").read_text(encoding="utf-8")
     assert 'data-mode="distance"' in page
     scene = scene_of(page)
