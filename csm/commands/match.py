@@ -49,7 +49,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
         + f"{100 * match.coverage:.1f} % of the target's vertices are reached\n{match.confidence.verdict}\n"
         f"{folder}: map.txt, match.html (to look at), match.json (how it was made)"
     )
-    return {"coverage": match.coverage, "returned": match.confidence.returned, "vertices": match.source.n_vertices}
+    return {"coverage": match.coverage, "trusted": match.confidence.trusted, "vertices": match.source.n_vertices}
 
 
 def _require_place(folder: Path, inputs: list[Path], overwrite: bool) -> None:

@@ -13,7 +13,7 @@ from csm._types import FloatArray
 from csm.evaluation.engine import evaluate
 from csm.evaluation.results import PairRow
 from csm.experiments.testing import Tested
-from csm.matching.confidence import there_and_back
+from csm.matching.both import match_both_ways
 from csm.mesh.shape import Mesh
 from csm.viewer.camera import View, guess_up
 from csm.viewer.colors import position_colors, pull_colors
@@ -74,7 +74,8 @@ def pair_viewer(tested: Tested, row: PairRow, view: View, what: str, *, errors: 
     """
     source, target = (tested.shapes.load(name).mesh for name in (row.source, row.target))
     here, there = (tested.method.describe(mesh, tested.store) for mesh in (source, target))
-    forward, backward = tested.matcher(here, there), tested.matcher(there, here)
+    found = match_both_ways(tested.matcher, here, there).forward
+    forward = found.vertex_map
     how = "errors are heat-method distances at all vertices"
     if errors is None:
         errors = spread(source, vertex_errors(tested, (row.source, row.target), source.n_vertices, POINTS))
@@ -85,7 +86,7 @@ def pair_viewer(tested: Tested, row: PairRow, view: View, what: str, *, errors: 
         pull_colors(reference, forward.indices),
         to_reference=forward.indices,
         errors=errors,
-        confidence=there_and_back(forward, backward, source).values,
+        confidence=None if found.confidence is None else found.confidence.values,
         features=np.asarray(here.features),
     )
     caption = f"{tested.label}: {source.name} to {target.name}, {what} ({1000 * row.age:.1f} thousandths of the "
@@ -94,7 +95,7 @@ def pair_viewer(tested: Tested, row: PairRow, view: View, what: str, *, errors: 
         reference=1,
         view=view,
         error_label=f"geodesic error, fraction of the {normaliser}",
-        confidence_label="confidence; 1 where a vertex returns to its place there and back",
+        confidence_label="confidence: the probability that the partner is near the truth",
         caption=f"{caption}{normaliser}); {how}",
     )
 

@@ -1,4 +1,4 @@
-"""How far to believe a map: does a vertex that goes to the other shape and back return to where it began?"""
+"""How far to believe a map, vertex by vertex: a probability from evidence that needs no ground truth."""
 
 from __future__ import annotations
 
@@ -8,69 +8,127 @@ import numpy as np
 from torch import Tensor
 
 from csm._types import FloatArray
+from csm.matching.calibration import calibration
 from csm.matching.embedded import farthest_points
 from csm.matching.maps import VertexMap
 from csm.matching.nearest import nearest
+from csm.matching.signals import NEAR, Sides, map_signals, spectral_signals
 from csm.mesh.debris import body_of
 from csm.mesh.shape import Mesh
 
-NEAR = 0.1
-"""Distance from which a vertex counts as not having come back, in units of the square root of the source's area."""
+TRUSTED = 0.5
+"""Confidence from which a partner counts as trustworthy: it is more probably right than not."""
 
 
 @dataclass(frozen=True, eq=False)
 class Confidence:
-    """What going there and back says of a map.
+    """How far to believe a map source -> target.
 
     Parameters
     ----------
+    values
+        Shape (N_source,), from 0 to 1: the probability that the vertex's partner is within 0.155 times the square root
+        of the target's area of the true one (a tenth of a human's geodesic diameter); 0 without a partner.  It is
+        calibrated, see `csm.matching.calibration`.
     distance
-        Shape (N_source,): from each vertex of the source to where it returns, through space, in units of the square
-        root of the source's area; infinite for vertices without a match.
+        Shape (N_source,): from each vertex of the source to where it returns on the way there and back, through space,
+        in units of the square root of the source's area; infinite for vertices without a partner.
     """
 
+    values: FloatArray
     distance: FloatArray
 
     @property
-    def values(self) -> FloatArray:
-        """Shape (N_source,): 1 where a vertex returns to its place, 0.37 at the distance `NEAR`, 0 without a match."""
-        values: FloatArray = np.exp(-((self.distance / NEAR) ** 2))
-        return values
-
-    @property
     def returned(self) -> float:
-        """Fraction of the matched vertices that return to within `NEAR`."""
+        """Fraction of the matched vertices that return to within `csm.matching.signals.NEAR`."""
         matched = np.isfinite(self.distance)
         return float((self.distance[matched] < NEAR).mean()) if matched.any() else 0.0
 
     @property
+    def trusted(self) -> float:
+        """Fraction of the vertices of the source with a confidence of at least `TRUSTED`."""
+        return float((self.values >= TRUSTED).mean()) if len(self.values) else 0.0
+
+    @property
     def verdict(self) -> str:
         """One sentence for people on how far to believe the map."""
-        share = f"{100 * self.returned:.0f} % of the matched vertices return to their place on the way there and back"
-        if self.returned >= 0.9:
-            return f"{share}, so most of the map is consistent"
-        if self.returned >= 0.6:
-            return f"{share}; where they do not, limbs may be exchanged or a part may have no partner"
+        if self.trusted >= 0.9:
+            return (
+                f"{100 * self.trusted:.0f} % of the source has a trustworthy partner: most of the map can be believed"
+            )
+        share = _in_words(1 - self.trusted)
+        if self.trusted >= 0.6:
+            return (
+                f"{share} of the source has no trustworthy partner: limbs may be exchanged, a part may be missing, or "
+                "the shapes differ there"
+            )
         return (
-            f"WARNING: only {share}, so this map is probably wrong in large parts: the shapes may differ in kind, or "
-            "one may be a part of the other"
+            f"WARNING: {share} of the source has no trustworthy partner: the two shapes may be of different kinds, or "
+            "one may be a part of the other; do not use this map without looking at it"
         )
 
+    def __repr__(self) -> str:
+        return f"Confidence({len(self.values)} vertices, {100 * self.trusted:.0f} % trusted)"
 
-def there_and_back(forward: VertexMap, backward: VertexMap, source: Mesh) -> Confidence:
-    """Compare where the vertices of the source begin with where they return.
+
+def _in_words(share: float) -> str:
+    """Return a share of less than all in words.
+
+    Examples
+    --------
+    >>> _in_words(0.34), _in_words(0.97)
+    ('about a third', 'almost all')
+    """
+    words = ((0.15, "about a tenth"), (0.22, "about a fifth"), (0.29, "about a quarter"), (0.4, "about a third"))
+    for most, text in (*words, (0.6, "about half"), (0.72, "about two thirds"), (0.9, "most")):
+        if share < most:
+            return text
+    return "almost all"
+
+
+def confidence_of(sides: Sides, start: VertexMap | None = None) -> Confidence:
+    """Compute how far to believe a map.
+
+    Parameters
+    ----------
+    sides
+        The shapes and the maps in both directions.
+    start
+        What the map was refined from; None if it is not refined.
+
+    Returns
+    -------
+    Confidence
+        0 where the map has no partner.
+    """
+    distance = there_and_back(sides.forward, sides.backward, sides.source.mesh)
+    signals = map_signals(sides)
+    if start is None:
+        values = calibration("map").probability(signals)
+    else:
+        values = calibration("refined").probability(np.hstack([signals, spectral_signals(sides, start)]))
+    return Confidence(np.where(sides.forward.indices >= 0, values, 0.0), distance)
+
+
+def there_and_back(forward: VertexMap, backward: VertexMap, source: Mesh) -> FloatArray:
+    """Return how far the vertices of the source are from where they return.
 
     Parameters
     ----------
     forward, backward
         Maps source -> target and target -> source.
     source
-        The shape on which distances are measured.
+        The shape on which distances are measured, through space.
+
+    Returns
+    -------
+    FloatArray
+        Shape (N_source,), in units of the square root of the source's area; infinite without a match.
     """
     there = forward.indices
     back = np.where(there >= 0, backward.indices[there], -1)
     away = np.linalg.norm(source.vertices[back] - source.vertices, axis=1) / np.sqrt(body_of(source).area)
-    return Confidence(np.where(back >= 0, away, np.inf))
+    return np.where(back >= 0, away, np.inf)
 
 
 def share_returning(source: Mesh, here: Tensor, there: Tensor, *, samples: int = 1000) -> float:

@@ -10,7 +10,8 @@ from csm._types import Float32Array
 from csm.data.store import Store
 from csm.descriptors.base import Descriptor
 from csm.matching.base import Described, Matcher, require_device
-from csm.matching.confidence import share_returning, there_and_back
+from csm.matching.both import match_both_ways
+from csm.matching.confidence import share_returning
 from csm.matching.maps import VertexMap
 from csm.matching.methods import Method, PrecomputedMethod, as_method
 from csm.matching.nearest import Rows, nearest
@@ -19,7 +20,6 @@ from csm.matching.refinement.registry import refiner as as_refiner
 from csm.matching.registry import matcher as as_matcher
 from csm.matching.result import Match
 from csm.matching.subjects import Cleaning, Subject, on_given, subject_of
-from csm.matching.way import Way
 from csm.mesh.debris import body_of
 from csm.mesh.inputs import MeshLike
 from csm.mesh.topology import rim
@@ -84,29 +84,19 @@ def match(
     subjects = [subject_of(mesh, clean, name) for mesh, name in ((source, "source"), (target, "target"))]
     require_device(device)
     here, there = (chosen.describe(subject.cleaned.mesh, store, device) for subject in subjects)
-    forward, backward, text = _ways(rule, improver, here, there)
-    forward, backward = on_given(forward, subjects[0], subjects[1]), on_given(backward, subjects[1], subjects[0])
-    given = subjects[0].given, subjects[1].given
-    confidence = there_and_back(forward.vertex_map, backward.vertex_map, given[0])
-    features = _on_given_rows(here, subjects[0]), _on_given_rows(there, subjects[1])
     made = rule if improver is None else Refined(rule, improver)
+    found = match_both_ways(made, here, there)
+    forward, backward = on_given(found.forward, *subjects), on_given(found.backward, *subjects[::-1])
+    given = subjects[0].given, subjects[1].given
+    features = _on_given_rows(here, subjects[0]), _on_given_rows(there, subjects[1])
     notes = (*_notes(*subjects), *_against_input(here, there))
-    return Match(*given, forward, backward, confidence, chosen, made, notes, text, features)
+    return Match(*given, forward, backward, chosen, made, notes, found.text, features)
 
 
 _CLEARLY = 0.1  # more of the vertices return
 
 match_meshes = match
 """The name of `match` in the first release."""
-
-
-def _ways(rule: Matcher, improver: Refiner | None, here: Described, there: Described) -> tuple[Way, Way, str]:
-    """Return the ways forth and back, and what a refinement did."""
-    if improver is None:
-        return Way(rule(here, there)), Way(rule(there, here)), ""
-    refined = improver(rule(here, there), here, there)
-    backward = refined.backward or improver(rule(there, here), there, here).forward
-    return refined.forward, backward, refined.text
 
 
 def _against_input(here: Described, there: Described) -> list[str]:

@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 
 from csm._places import load
 from csm._types import Float32Array, FloatArray, IntArray
+from csm.errors import ConfigError
 from csm.matching.barycentric import BarycentricMap
 from csm.matching.base import Matcher
-from csm.matching.confidence import Confidence, there_and_back
+from csm.matching.confidence import Confidence
 from csm.matching.errors import Normaliser, map_errors
 from csm.matching.functional import FunctionalMap
 from csm.matching.maps import VertexMap
@@ -35,8 +36,6 @@ class Match:
         The meshes, with the vertices as they were given.
     there, back
         The map source -> target and the one target -> source, in the forms that were computed.
-    confidence
-        How well the vertices of the source return from the target.
     method, matcher
         How it was made.
     notes
@@ -51,7 +50,6 @@ class Match:
     target: Mesh
     there: Way
     back: Way
-    confidence: Confidence
     method: Method
     matcher: Matcher
     notes: tuple[str, ...] = ()
@@ -74,6 +72,13 @@ class Match:
         return self.there.functional_map
 
     @property
+    def confidence(self) -> Confidence:
+        """How far to believe the partner of each vertex of the source."""
+        if self.there.confidence is None:
+            raise ConfigError(f"{self!r}: no confidence was computed; csm.match computes it")
+        return self.there.confidence
+
+    @property
     def indices(self) -> IntArray:
         """For each vertex of the source a vertex of the target, shape (N_source,), 0-based."""
         return self.vertex_map.indices
@@ -89,14 +94,12 @@ class Match:
 
         It is the map that was computed in that direction: maps between vertices are not one to one.
         """
-        confidence = there_and_back(self.back.vertex_map, self.there.vertex_map, self.target)
         other = replace(
             self,
             source=self.target,
             target=self.source,
             there=self.back,
             back=self.there,
-            confidence=confidence,
             features=None if self.features is None else self.features[::-1],
         )
         other.__dict__["inverse"] = self

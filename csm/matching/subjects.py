@@ -10,6 +10,7 @@ import numpy as np
 from csm._types import IntArray
 from csm.errors import ConfigError
 from csm.matching.barycentric import BarycentricMap
+from csm.matching.confidence import Confidence
 from csm.matching.maps import VertexMap
 from csm.matching.way import Way
 from csm.mesh.check import Finding, check
@@ -131,7 +132,13 @@ def _rows_of(wanted: IntArray, rows: IntArray) -> IntArray:
 
 def on_given(found: Way, source: Subject, target: Subject) -> Way:
     """Return one way between the cleaned meshes as one between the given ones; a functional map stays as it is."""
-    vertex_map, precise = on_given_vertices(found.vertex_map, source, target), found.precise
-    if precise is None:
-        return Way(vertex_map, found.functional_map)
-    return Way(vertex_map, found.functional_map, lambda: on_given_faces(precise(), source, target))
+    precise, known, at = found.precise, found.confidence, source.cleaned.vertex_map
+    confidence = known and Confidence(
+        np.where(at >= 0, known.values[at], 0.0), np.where(at >= 0, known.distance[at], np.inf)
+    )
+    return Way(
+        on_given_vertices(found.vertex_map, source, target),
+        found.functional_map,
+        confidence,
+        None if precise is None else lambda: on_given_faces(precise(), source, target),
+    )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from csm.matching.barycentric import BarycentricMap
+from csm.matching.confidence import Confidence
 from csm.matching.functional import FunctionalMap
 from csm.matching.maps import VertexMap
 
@@ -21,12 +22,15 @@ class Way:
         Every vertex of the source to a vertex of the target.
     functional_map
         The map between functions; None if that was not computed.
+    confidence
+        How far to believe it; None if that was not computed.
     precise
         Computes the map of every vertex of the source into a face of the target; None if that cannot be.
     """
 
     vertex_map: VertexMap
     functional_map: FunctionalMap | None = None
+    confidence: Confidence | None = None
     precise: Callable[[], BarycentricMap] | None = None
 
     @cached_property
@@ -35,5 +39,5 @@ class Way:
         return None if self.precise is None else self.precise()
 
     def __repr__(self) -> str:
-        more = [name for name in ("functional_map", "precise") if getattr(self, name) is not None]
+        more = [name for name in ("functional_map", "confidence", "precise") if getattr(self, name) is not None]
         return f"Way({self.vertex_map.source} -> {self.vertex_map.target}, {', '.join(['vertex_map', *more])})"

@@ -49,6 +49,8 @@ STUDIES: Mapping[str, Entry] = {
     "figure11": _learned("ACD alone, with a perceptron and with CSMCNN", "figure11", "faust", "curves"),
     "figure12": Entry("errors over noise of the vertices", "methods_on_bodies:Figure12"),
     "figure13": Entry("errors with parts cut away or grown together", "methods_on_bodies:Figure13"),
+    "confidence": Entry("confidence of matches against the truth; also fits it", "confidence:ConfidenceStudy"),
+    "refinement": Entry("errors before and after refinement", "refinement:Refinement"),
     "coarse": _learned("the methods of table4 on 1000 vertices, hardly cut short", "coarse", "coarse", "dots"),
     "humans_table": _learned("the methods of table4 on the built-in humans", "humans_table", "humans", "dots"),
     "ablation": _learned("K_s, terms and normalisation of CSMCNN", "ablation", "ablation", "sweeps"),

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from csm._types import FloatArray
 from csm.errors import ConfigError
 from csm.viewer.figures import Curve
-from csm.viewer.style import CYCLE, line_style, plain_axes
+from csm.viewer.style import CYCLE, line_style, new_figure, plain_axes
 
 _LEGEND_COLUMNS = 4
 _LABEL_WIDTH = 24  # letters that the height of a panel has room for
@@ -151,4 +151,27 @@ def sweeps_figure(sweeps: Sequence[Sweep], quantity: str) -> Figure:
     grid[0].set_ylim(bottom=0)
     grid[0].set_ylabel(textwrap.fill(quantity, _LABEL_WIDTH), fontsize=9)
     grid[-1].legend(frameon=False, fontsize=8)
+    return figure
+
+
+def reliability_figure(curves: Mapping[str, Sequence[tuple[float, float, int]]]) -> Figure:
+    """Plot how often matches are right over how confident csm was, with a line per kind of map.
+
+    Parameters
+    ----------
+    curves
+        Name -> steps of confidence: mean confidence and share of right matches, from 0 to 1, and the number of matches.
+    """
+    figure, axes = new_figure(4.6, 4.2)
+    axes.plot([0, 1], [0, 1], color="0.6", linewidth=1, linestyle=(0, (2, 2)), label="perfect")
+    most = max((count for steps in curves.values() for _, _, count in steps), default=1)
+    for k, (name, steps) in enumerate(curves.items()):
+        said, right, counts = (np.array(column) for column in zip(*steps, strict=True))
+        axes.plot(said, right, label=name, **line_style(k))
+        axes.scatter(said, right, s=8 + 80 * np.sqrt(counts / most), color=line_style(k)["color"], zorder=3)
+    axes.set_xlim(0, 1)
+    axes.set_ylim(0, 1)
+    axes.set_xlabel("confidence")
+    axes.set_ylabel("share of right matches")
+    axes.legend(frameon=False, fontsize=8, loc="upper left")
     return figure

@@ -127,7 +127,7 @@ def match_page(match: Match, method: str) -> str:
             Panel(match.target, reference, features=there),
         ],
         reference=1,
-        confidence_label="confidence in the match; 1 where a vertex returns to its place there and back",
+        confidence_label="confidence: the probability that the partner is near the truth",
     )
     title, verdict = f"{match.source.name} → {match.target.name}", f"{match.confidence.verdict}."
     return viewer_html(title, viewer, lead=verdict, text=_caption(match, method))
@@ -170,6 +170,7 @@ def _account(match: Match, meaning: str, method: str) -> dict[str, Any]:
         "unmatched": match.vertex_map.n_unmatched,
         "coverage": match.coverage,
         "returned": match.confidence.returned,
+        "trusted": match.confidence.trusted,
         "verdict": match.confidence.verdict,
         "notes": list(match.notes),
         "command": made.command,

@@ -1,19 +1,20 @@
+from __future__ import annotations
+
 import numpy as np
 import pytest
+import torch
 
 from csm.matching import VertexMap
-from csm.matching.confidence import NEAR, Confidence, there_and_back
-from tests.shapes import sphere
+from csm.matching.base import Described
+from csm.matching.confidence import TRUSTED, Confidence, confidence_of, share_returning, there_and_back
+from csm.matching.signals import NEAR, Sides
+from tests.shapes import blob, sphere
 
 
 def test_a_map_and_its_inverse_return_everything():
     ball = sphere(2)
     there = np.random.default_rng(0).permutation(ball.n_vertices)
-    found = there_and_back(VertexMap(there, 162), VertexMap(np.argsort(there), 162), ball)
-    assert not found.distance.any()
-    assert (found.values == 1).all()
-    assert found.returned == 1
-    assert "WARNING" not in found.verdict
+    assert not there_and_back(VertexMap(there, 162), VertexMap(np.argsort(there), 162), ball).any()
 
 
 def test_distances_are_in_units_of_the_root_of_the_area_and_inf_without_a_match():
@@ -21,17 +22,51 @@ def test_distances_are_in_units_of_the_root_of_the_area_and_inf_without_a_match(
     there = np.where(np.arange(162) == 5, -1, 0)
     found = there_and_back(VertexMap(there, 162), VertexMap(np.full(162, 7), 162), ball)
     wanted = np.linalg.norm(ball.vertices - ball.vertices[7], axis=1) / np.sqrt(ball.area)
-    np.testing.assert_allclose(np.delete(found.distance, 5), np.delete(wanted, 5))
-    assert np.isinf(found.distance[5])
-    assert found.values[5] == 0
+    np.testing.assert_allclose(np.delete(found, 5), np.delete(wanted, 5))
+    assert np.isinf(found[5])
 
 
-@pytest.mark.parametrize(("share", "said"), [(0.95, "consistent"), (0.7, "limbs"), (0.3, "WARNING"), (0.0, "WARNING")])
-def test_the_verdict_gets_worse_as_fewer_return(share, said):
-    distance = np.where(np.arange(100) < 100 * share, 0.5 * NEAR, 3 * NEAR)
-    assert said in Confidence(distance).verdict
-    assert Confidence(distance).returned == pytest.approx(share)
+@pytest.mark.parametrize(
+    ("share", "said"),
+    [
+        (0.95, "95 % of the source has a trustworthy partner"),
+        (0.7, "about a third of the source has no trustworthy partner: limbs may"),
+        (0.3, "WARNING: about two thirds of the source has no"),
+        (0.0, "WARNING: almost all of the source has no"),
+    ],
+)
+def test_the_verdict_gets_worse_as_fewer_can_be_trusted(share, said):
+    values = np.where(np.arange(100) < 100 * share, TRUSTED, TRUSTED - 0.1)
+    found = Confidence(values, np.zeros(100))
+    assert said in found.verdict
+    assert found.trusted == pytest.approx(share)
 
 
-def test_a_map_without_any_match_is_not_believed():
-    assert Confidence(np.full(3, np.inf)).returned == 0
+def test_returning_counts_what_is_matched():
+    distance = np.array([0.5 * NEAR, 3 * NEAR, np.inf, 0.0])
+    assert Confidence(np.zeros(4), distance).returned == pytest.approx(2 / 3)
+    assert Confidence(np.zeros(3), np.full(3, np.inf)).returned == 0
+
+
+def test_a_true_map_is_believed_more_than_a_random_one_and_no_partner_not_at_all():
+    ball = blob(3)
+    n = ball.n_vertices
+    described = Described(ball, torch.from_numpy(ball.vertices))
+    identity, mixed = np.arange(n), np.random.default_rng(0).permutation(n)
+    true = VertexMap(np.where(identity == 7, -1, identity), n)
+    good = confidence_of(Sides(described, described, true, VertexMap(identity, n)))
+    bad = confidence_of(Sides(described, described, VertexMap(mixed, n), VertexMap(mixed, n)))
+    assert good.values[7] == 0
+    assert np.median(good.values) > 0.9 > 0.3 > np.median(bad.values)
+    refined = Sides(described, described, VertexMap(identity, n), VertexMap(identity, n))
+    wrong = Sides(described, described, VertexMap(mixed, n), VertexMap(np.argsort(mixed), n))
+    assert np.median(confidence_of(refined, refined.forward).values) > 0.9
+    assert np.median(confidence_of(wrong, refined.forward).values) < 0.3  # it returns, but nothing else speaks for it
+
+
+def test_descriptors_that_know_their_place_return():
+    ball = blob(3)
+    here = torch.from_numpy(ball.vertices)
+    assert share_returning(ball, here, here) == 1.0
+    noise = torch.randn(here.shape, generator=torch.Generator().manual_seed(0), dtype=here.dtype)
+    assert share_returning(ball, here, noise) < 0.5

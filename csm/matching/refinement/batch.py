@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from csm.matching.embedded import Samples
+from csm.matching.judging import judged
 from csm.matching.refinement.pair import SampledPair
 
 _BLOCK = 4096  # queries that are compared with all candidates at a time
@@ -97,10 +98,8 @@ class Scores:
 
     Parameters
     ----------
-    stretch
-        |C^T C - 1| / sqrt(K) of the functional map: areas are not kept.
-    commutation
-        |C Lambda_t - Lambda_s C| over the size of the eigenvalues: lengths are not kept.
+    stretch, commutation
+        Of the functional map, see `csm.matching.judging.judged`.
     descriptor
         Root of the mean squared distance of the features, whose total variance is 1.
     """
@@ -118,11 +117,7 @@ class Scores:
 def scores(maps: Tensor, pair: SampledPair, k: int) -> Scores:
     """Judge maps (B, p) by their functional maps of k x k and by the features."""
     matrices = matrices_of(maps, pair, k)
-    here, there = pair.pair.source.evals[:k], pair.pair.target.evals[:k]
-    unit = torch.eye(k, device=maps.device)
-    stretch = (matrices.transpose(1, 2) @ matrices - unit).flatten(1).norm(dim=1) / k**0.5
-    gaps = matrices * there - here[:, None] * matrices
-    size = (here.norm() * there.norm()).sqrt()
+    stretch, commutation = judged(matrices, pair.pair.source.evals[:k], pair.pair.target.evals[:k])
     apart = (pair.features_source - pair.features_target[maps]).square().sum(-1)
     areas = pair.source.areas / pair.source.areas.sum()
-    return Scores(stretch, gaps.flatten(1).norm(dim=1) / size, (apart @ areas).sqrt())
+    return Scores(stretch, commutation, (apart @ areas).sqrt())

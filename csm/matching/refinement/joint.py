@@ -200,7 +200,7 @@ def way_between(
         return replace(nearest_on_faces(rows, points, faces), source=source, target=target)
 
     found = VertexMap(nearest(queries, candidates), pair.target.mesh.n_vertices, source, target)
-    return Way(found, functional, precise)
+    return Way(found, functional, precise=precise)
 
 
 def _text(sizes: Sequence[int]) -> str:
