@@ -16,7 +16,7 @@ from csm.data.prepare import Recipe, shared_operators
 from csm.data.store import Store
 from csm.descriptors.constant import Constant
 from csm.errors import ConfigError
-from csm.matching.embedded import Embedded, n_eigenfunctions
+from csm.matching.embedded import Embedded, n_eigenfunctions, spread_vertices
 from csm.matching.maps import VertexMap
 from csm.mesh.debris import unit_area
 from csm.mesh.shape import Mesh
@@ -147,7 +147,12 @@ class Described:
     def embedded(self) -> Embedded:
         """The mesh at unit area with its eigenfunctions, as refinements compute with them."""
         spectrum = self.spectrum(n_eigenfunctions(self.mesh))
-        return Embedded(unit_area(self.mesh), spectrum, self.features.device)
+        return Embedded(unit_area(self.mesh), spectrum, self.features.device, self.order)
+
+    @cached_property
+    def order(self) -> IntArray:
+        """Vertices spread over the shape, see `csm.matching.embedded.spread_vertices`."""
+        return spread_vertices(self.mesh)
 
 
 class Matcher(ABC):

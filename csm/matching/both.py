@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from csm.matching.base import Described, Matcher
 from csm.matching.confidence import confidence_of
 from csm.matching.maps import VertexMap
-from csm.matching.refinement.base import Refined
+from csm.matching.refinement.base import Refined, start_of
 from csm.matching.signals import Sides
 from csm.matching.way import Way
 
@@ -34,7 +34,7 @@ def match_both_ways(rule: Matcher, source: Described, target: Described) -> Both
     if not isinstance(rule, Refined):
         there, back = rule(source, target), rule(target, source)
         return _judged(Way(there), Way(back), None, None, source, target, "")
-    starts = rule.matcher(source, target), rule.matcher(target, source)
+    starts = start_of(rule.matcher, source, target), start_of(rule.matcher, target, source)
     done = rule.refiner(starts[0], source, target)
     backward = done.backward or rule.refiner(starts[1], target, source).forward
     return _judged(done.forward, backward, *starts, source, target, done.text)

@@ -55,7 +55,10 @@ class Calibration:
 def fit_calibration(
     signals: FloatArray, right: BoolArray, names: Sequence[str], weights: FloatArray | None = None
 ) -> Calibration:
-    """Fit a logistic regression with a small ridge.
+    """Fit a logistic regression with a small ridge, in which no evidence against a map speaks for it.
+
+    Weights of agreement (start) are at least 0, those of all other signals at most 0, so that maps that are worse than
+    all that it was fitted on are believed less, not more.
 
     Parameters
     ----------
@@ -86,7 +89,8 @@ def fit_calibration(
         value = float((share * (np.logaddexp(0, z) - y * z)).sum() + _RIDGE * (ridge**2).sum())
         return value, design.T @ (share * (expit(z) - y)) + 2 * _RIDGE * ridge
 
-    w = minimize(loss, np.zeros(design.shape[1]), jac=True, method="L-BFGS-B").x
+    bounds = [(None, None), *((0, None) if name in _AS_THEY_ARE else (None, 0) for name in names)]
+    w = minimize(loss, np.zeros(design.shape[1]), jac=True, method="L-BFGS-B", bounds=bounds).x
     numbers = [tuple(float(value) for value in x) for x in (centre, scale, w[1:])]
     return Calibration(tuple(names), numbers[0], numbers[1], numbers[2], float(w[0]))
 

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from torch import Tensor
 
-from csm._types import FloatArray
+from csm._types import FloatArray, IntArray
 from csm.matching.calibration import calibration
-from csm.matching.embedded import farthest_points
 from csm.matching.maps import VertexMap
 from csm.matching.nearest import nearest
 from csm.matching.signals import NEAR, Sides, map_signals, spectral_signals
@@ -131,24 +130,23 @@ def there_and_back(forward: VertexMap, backward: VertexMap, source: Mesh) -> Flo
     return np.where(back >= 0, away, np.inf)
 
 
-def share_returning(source: Mesh, here: Tensor, there: Tensor, *, samples: int = 1000) -> float:
+def share_returning(source: Mesh, at: IntArray, here: Tensor, there: Tensor) -> float:
     """Return how many nearest neighbours return to within `NEAR` on the way there and back, by descriptors alone.
 
     Parameters
     ----------
     source
         N_source vertices.
+    at
+        Those that are tried.
     here, there
         Descriptors of both shapes, (N_source, Q) and (N_target, Q).
-    samples
-        Vertices that are tried, spread over the source.
 
     Returns
     -------
     float
         A fraction of the tried vertices.
     """
-    at = farthest_points(source.vertices, samples)
     back = nearest(there[nearest(here[at], there)], here)
     away = np.linalg.norm(source.vertices[back] - source.vertices[at], axis=1)
     return float((away < NEAR * np.sqrt(body_of(source).area)).mean())

@@ -12,6 +12,7 @@ from torch import Tensor
 
 from csm._types import FloatArray, IntArray
 from csm.matching.orientation import spectral_turns
+from csm.mesh.debris import body_of
 from csm.mesh.shape import Mesh
 from csm.operators.spectrum import Spectrum
 
@@ -20,6 +21,9 @@ MOST = 200
 
 CROSSED = 8
 """Eigenfunctions whose gradients are crossed, which tells a map from its mirror image."""
+
+SPREAD = 2500
+"""Vertices that samples are taken from."""
 
 _SMOOTH = 60  # eigenfunctions that these crossed gradients are projected on
 
@@ -73,10 +77,19 @@ class Embedded:
         Its K eigenpairs.
     device
         Where the tensors are.
+    order
+        Vertices spread over the shape, see `spread_vertices`; computed if they are not given.
     """
 
-    def __init__(self, mesh: Mesh, spectrum: Spectrum, device: str | torch.device = "cpu") -> None:
+    def __init__(
+        self,
+        mesh: Mesh,
+        spectrum: Spectrum,
+        device: str | torch.device = "cpu",
+        order: IntArray | None = None,
+    ) -> None:
         self.mesh, self.spectrum, self.device = mesh, spectrum, device
+        self.order = spread_vertices(mesh) if order is None else order
         self._samples: dict[int, Samples] = {}
 
     @property
@@ -104,10 +117,10 @@ class Embedded:
         return spectral_turns(self.mesh, self.spectrum, min(CROSSED, self.k), min(_SMOOTH, self.k))
 
     def samples(self, n: int) -> Samples:
-        """Return `n` samples, or all vertices that have an area if these are fewer."""
+        """Return `n` samples, or the whole `order` if that is shorter."""
         if n not in self._samples:
             usable = np.flatnonzero(self.spectrum.mass > 0)
-            at = usable[farthest_points(self.mesh.vertices[usable], n)]
+            at = self.order[:n]
             owner = cKDTree(self.mesh.vertices[at]).query(self.mesh.vertices[usable])[1]
             areas = np.bincount(owner, self.spectrum.mass[usable], minlength=len(at)).astype(np.float64)
             self._samples[n] = Samples(at, self._tensor(areas), self.evecs[at], self._tensor(self._turns[at]))
@@ -115,6 +128,16 @@ class Embedded:
 
     def _tensor(self, values: FloatArray) -> Tensor:
         return torch.from_numpy(np.ascontiguousarray(values, dtype=np.float32)).to(self.device)
+
+
+def spread_vertices(mesh: Mesh, n: int = SPREAD) -> IntArray:
+    """Return `n` vertices of a mesh without its debris, the first of which are spread evenly however many one takes.
+
+    Of a mesh with fewer vertices all are returned.
+    """
+    usable = np.flatnonzero(body_of(mesh).vertices)
+    found: IntArray = usable[farthest_points(mesh.vertices[usable], n)]
+    return found
 
 
 def farthest_points(points: FloatArray, n: int) -> IntArray:
@@ -127,15 +150,14 @@ def farthest_points(points: FloatArray, n: int) -> IntArray:
     points
         Shape (N, 3).
     n
-        All points are returned, in their order, if there are not more.
+        All points are returned if there are not more.
 
     Examples
     --------
     >>> farthest_points(np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [9, 0, 0]]), 2)
     array([3, 0])
     """
-    if len(points) <= n:
-        return np.arange(len(points))
+    n = min(n, len(points))
     chosen = np.empty(n, dtype=np.int64)
     distance = np.full(len(points), np.inf)
     at = int(((points - points.mean(0)) ** 2).sum(1).argmax())

@@ -19,6 +19,7 @@ from csm.matching.refinement.base import Refined, Refiner
 from csm.matching.refinement.registry import refiner as as_refiner
 from csm.matching.registry import matcher as as_matcher
 from csm.matching.result import Match
+from csm.matching.signals import SAMPLES
 from csm.matching.subjects import Cleaning, Subject, on_given, subject_of
 from csm.mesh.debris import body_of
 from csm.mesh.inputs import MeshLike
@@ -103,8 +104,9 @@ def _against_input(here: Described, there: Described) -> list[str]:
     """Say it where the descriptor that a network was given agrees better with itself than the learned one."""
     if here.given is None or there.given is None:
         return []
-    learned = share_returning(here.mesh, here.features, there.features)
-    plain = share_returning(here.mesh, here.given, there.given)
+    tried = here.order[:SAMPLES]
+    learned = share_returning(here.mesh, tried, here.features, there.features)
+    plain = share_returning(here.mesh, tried, here.given, there.given)
     if plain < learned + _CLEARLY:
         return []
     return [

@@ -15,7 +15,7 @@ from torch import Tensor
 
 from csm._types import FloatArray, IntArray
 from csm.matching.base import Described
-from csm.matching.embedded import Embedded, farthest_points
+from csm.matching.embedded import Embedded
 from csm.matching.functional import functional_map
 from csm.matching.judging import judged
 from csm.matching.maps import VertexMap
@@ -25,7 +25,9 @@ from csm.mesh.shape import Mesh
 NEAR = 0.1
 """Distance, in units of the square root of the area, from which a vertex counts as having gone elsewhere."""
 
-_SAMPLES = 1000  # spread over the source; what is around a vertex is known at the nearest of them
+SAMPLES = 1000
+"""Vertices spread over the source; what is around a vertex is known at the nearest of them."""
+
 _AROUND = 20
 _FAR = 100  # samples that a vertex's distances to all parts of the shape are measured to
 _FINE = 60  # eigenfunctions of these distances
@@ -79,6 +81,8 @@ def map_signals(sides: Sides) -> FloatArray:
 def spectral_signals(sides: Sides, start: VertexMap) -> FloatArray:
     """Return the signals `OF_REFINED` of every vertex of the source, shape (N_source, 6).
 
+    `start` needs entries at the first `SAMPLES` of the source's order only.
+
     *start*: agreement, from 0 to 1, of the map with the nearest neighbours that it was refined from, around the vertex.
     *apart*: median over 100 samples of how much the biharmonic distance to them (Lipman et al. 2010) changes under the
     map, over the mean distance.  Their mean and median over the shape; and *stretch* and *commutation* of
@@ -86,8 +90,8 @@ def spectral_signals(sides: Sides, start: VertexMap) -> FloatArray:
     """
     there = sides.forward.indices
     around, points = _Around(sides), _unit(sides.target.mesh)
-    agree = np.exp(-((np.linalg.norm(points[start.indices] - points[there], axis=1) / NEAR) ** 2))
-    near = agree[around.at][around.nearest].mean(1)
+    apart_there = points[start.indices[around.at]] - points[there[around.at]]
+    near = np.exp(-((np.linalg.norm(apart_there, axis=1) / NEAR) ** 2))[around.nearest].mean(1)
     apart = _biharmonic_changes(sides.source.embedded, sides.target.embedded, there)
     whole = np.array([near.mean(), np.median(apart), *_judged(sides)])
     return np.hstack([np.stack([near, apart], axis=1), np.tile(whole, (len(near), 1))])
@@ -103,7 +107,7 @@ class _Around:
 
     def __init__(self, sides: Sides) -> None:
         self.here, self.points = _unit(sides.source.mesh), _unit(sides.target.mesh)[sides.forward.indices]
-        self.at = farthest_points(self.here, _SAMPLES)
+        self.at = sides.source.order[:SAMPLES]
         k = np.arange(1, min(_AROUND, len(self.at)) + 1)
         self.nearest: IntArray = np.asarray(cKDTree(self.here[self.at]).query(self.here, k=k)[1], dtype=np.int64)
 

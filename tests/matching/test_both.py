@@ -13,7 +13,7 @@ from tests.shapes import blob
 @pytest.mark.parametrize("rule", ["nearest", "nearest+joint", "nearest+zoomout"])
 def test_both_ways_are_matched_and_judged(rule):
     ball, order = blob(3), np.random.default_rng(0).permutation(blob(3).n_vertices)
-    here = Described(ball, torch.from_numpy(ball.vertices))
+    here = Described(ball, torch.tensor(ball.vertices))
     there = Described(ball.__class__(ball.vertices[order], np.argsort(order)[ball.faces]), here.features[order])
     found = match_both_ways(matcher(rule), here, there)
     assert (found.forward.vertex_map.indices == np.argsort(order)).mean() > 0.98

@@ -118,7 +118,7 @@ def test_a_way_is_put_on_the_given_meshes_in_every_form():
     source, target = subject_of(mesh), subject_of(blob(2))
     plain = VertexMap(np.arange(162), 162)
     functional = FunctionalMap(np.eye(2))
-    way = Way(plain, functional, lambda: BarycentricMap.of_vertices(plain, blob(2).faces))
+    way = Way(plain, functional, precise=lambda: BarycentricMap.of_vertices(plain, blob(2).faces))
     way = on_given(way, source, target)
     assert np.flatnonzero(way.barycentric.faces >= 0).tolist() == sorted(kept)
     np.testing.assert_array_equal(way.barycentric.vertex_map(), way.vertex_map)

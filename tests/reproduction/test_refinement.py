@@ -3,9 +3,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from csm.data.registry import find_set
 from csm.data.store import Store
 from csm.errors import ConfigError
-from csm.evaluation import engine
+from csm.evaluation.engine import evaluate
+from csm.evaluation.protocol import EvaluationProtocol
 from csm.reproduction.refinement import Refinement
 from csm.reproduction.study import Context, Findings
 from tests.remeshedset import write_faust, write_shrec19, write_tosca
@@ -42,9 +44,10 @@ def test_there_is_a_row_for_each_way_to_match(findings):
 
 
 def test_errors_are_those_of_the_engine(context, findings):
-    shapes = __import__("csm").find_set(context.root, "TOSCA_5k_remeshed")
-    (wanted,) = engine.evaluate("acd_paper", shapes, refine="joint", store=context.store, workers=1, progress=False)
-    assert findings.rows[1]["TOSCA summary"]["age"] == pytest.approx(wanted.summary["age"], rel=0.2)
+    shapes = find_set(context.root, "TOSCA_5k_remeshed")
+    protocol = EvaluationProtocol([("cat0", "cat1"), ("cat1", "cat2")], drawn="pair")
+    (wanted,) = evaluate("acd_paper", shapes, protocol, refine="joint", store=context.store, workers=1, progress=False)
+    assert findings.rows[1]["TOSCA summary"]["age"] == pytest.approx(wanted.summary["age"], rel=1e-5)
 
 
 def test_shapes_that_nothing_was_tuned_on_have_a_column(findings):

@@ -42,11 +42,20 @@ class Refiner(ABC):
 
     @abstractmethod
     def __call__(self, start: VertexMap, source: Described, target: Described) -> RefinedMap:
-        """Refine a map source -> target that has an entry for every vertex of the source."""
+        """Refine a map source -> target; -1 where no partner is known, such as at all but some samples."""
 
     def parameters(self) -> dict[str, Any]:
         """Return every parameter as plain data: with `name`, all that a cache key needs."""
         return asdict(self)  # type: ignore[call-overload,no-any-return]
+
+
+STARTED = 1000
+"""Vertices, spread over the source, that a map to be refined is computed at."""
+
+
+def start_of(matcher: Matcher, source: Described, target: Described) -> VertexMap:
+    """Return the map of a matcher at samples of the source, which is enough to begin a refinement with."""
+    return matcher(source, target, at=source.order[:STARTED])
 
 
 @dataclass(frozen=True)
@@ -71,7 +80,7 @@ class Refined(Matcher):
 
     def __call__(self, source: Described, target: Described, at: IntArray | None = None) -> VertexMap:
         """Return the refined map, of all vertices whatever is asked for: a refinement needs all of them."""
-        return self.refiner(self.matcher(source, target), source, target).forward.vertex_map
+        return self.refiner(start_of(self.matcher, source, target), source, target).forward.vertex_map
 
     def parameters(self) -> dict[str, Any]:
         """Return the parameters of both."""

@@ -15,17 +15,29 @@ from csm.matching.embedded import Samples
 from csm.matching.judging import judged
 from csm.matching.refinement.pair import SampledPair
 
-_BLOCK = 4096  # queries that are compared with all candidates at a time
+_BLOCK = 2**21  # numbers of a block of distances
 
 
-def nearest_rows(queries: Tensor, candidates: Tensor) -> Tensor:
-    """Return the numbers of the nearest candidates (q, D) of queries (..., D), in float32 products."""
+def nearest_rows(queries: Tensor, candidates: Tensor, bias: Tensor | None = None) -> Tensor:
+    """Return the numbers of the nearest candidates (q, D) of queries (..., D), in float32 products.
+
+    Parameters
+    ----------
+    queries, candidates
+        What is compared.
+    bias
+        Shape (p, q), for queries (B, p, D): half of squared distances that are added to those of each of the B.
+    """
     rows = queries.reshape(-1, queries.shape[-1])
     half_norms = 0.5 * candidates.square().sum(1)
     found = torch.empty(len(rows), dtype=torch.int64, device=rows.device)
-    for begin in range(0, len(rows), _BLOCK):
-        part = rows[begin : begin + _BLOCK]
-        found[begin : begin + _BLOCK] = torch.addmm(half_norms, part, candidates.T, alpha=-1.0).argmin(1)
+    size = max(1, _BLOCK // len(candidates)) if bias is None else len(bias)
+    scores = torch.empty(size, len(candidates), dtype=rows.dtype, device=rows.device)  # stays in the cache
+    added = half_norms if bias is None else half_norms + bias
+    for begin in range(0, len(rows), size):
+        part = rows[begin : begin + size]
+        score = torch.addmm(added, part, candidates.T, alpha=-1.0, out=scores[: len(part)])
+        found[begin : begin + size] = score.argmin(1)
     return found.reshape(queries.shape[:-1])
 
 
@@ -73,10 +85,8 @@ def step(matrices: Tensor, pair: SampledPair, guides: Guides) -> Tensor:
         turned, turns = _turns(matrices, pair.source, pair.target)
         queries.append(guides.orientation * turned)
         candidates.append(guides.orientation * turns)
-    if guides.descriptor > 0:
-        queries.append((guides.descriptor * pair.features_source).expand(len(matrices), -1, -1))
-        candidates.append(guides.descriptor * pair.features_target)
-    return nearest_rows(torch.cat(queries, -1), torch.cat(candidates, -1))
+    bias = 0.5 * guides.descriptor**2 * pair.apart if guides.descriptor > 0 else None
+    return nearest_rows(torch.cat(queries, -1), torch.cat(candidates, -1), bias)
 
 
 def _turns(matrices: Tensor, source: Samples, target: Samples) -> tuple[Tensor, Tensor]:

@@ -22,9 +22,9 @@ from csm.matching.barycentric import BarycentricMap, nearest_on_faces
 from csm.matching.base import Described
 from csm.matching.functional import FunctionalMap
 from csm.matching.maps import VertexMap
-from csm.matching.nearest import nearest
-from csm.matching.refinement.base import RefinedMap, Refiner
+from csm.matching.refinement.base import STARTED, RefinedMap, Refiner
 from csm.matching.refinement.batch import nearest_rows, orthogonal
+from csm.matching.refinement.clusters import nearest_of_many
 from csm.matching.refinement.pair import Pair
 from csm.matching.way import Way
 
@@ -154,10 +154,14 @@ class Joint(Refiner):
 
 
 def first_matrix(indices: IntArray, pair: Pair, k: int) -> Tensor:
-    """Return the functional map (k, k) of a map from all vertices of the source."""
-    here = np.flatnonzero(indices >= 0)
-    there = torch.from_numpy(indices[here]).to(pair.source.device)
-    return least_squares(pair, here, there, pair.source.areas[here], k)
+    """Return the functional map (k, k) of a map that is known at samples of the source, or at other vertices of it."""
+    samples = pair.source.samples(STARTED)
+    known = indices[samples.at] >= 0
+    here = samples.at[known] if known.all() else np.flatnonzero(indices >= 0)
+    if len(here) < k:
+        raise ConfigError(f"a map that is known at {len(here)} vertices cannot be refined; wanted {k} at least")
+    areas = samples.areas if known.all() else pair.source.areas[here]
+    return least_squares(pair, here, torch.from_numpy(indices[here]).to(areas.device), areas, k)
 
 
 def finished(matrix: Tensor, pair: Pair, climb: Climb, start: VertexMap, text: str) -> RefinedMap:
@@ -199,7 +203,8 @@ def way_between(
         rows, points = queries.double().cpu().numpy(), candidates.double().cpu().numpy()
         return replace(nearest_on_faces(rows, points, faces), source=source, target=target)
 
-    found = VertexMap(nearest(queries, candidates), pair.target.mesh.n_vertices, source, target)
+    nearest = nearest_of_many(queries, candidates, pair.target.order)
+    found = VertexMap(nearest.cpu().numpy(), pair.target.mesh.n_vertices, source, target)
     return Way(found, functional, precise=precise)
 
 

@@ -28,6 +28,7 @@ from csm.matching.refinement.pair import Pair, SampledPair
 
 _SEARCH = (8, 10, 12, 15, 18, 22, 26, 30, 30)  # sizes of the functional maps of the search
 _UNGUIDED = 3  # of these steps, the last ones, which the orientation does not guide
+_KEPT = 32  # starts that these are made with, the best ones so far
 _FINAL_SAMPLES = 1000  # vertices of each shape that the choice is made at
 _FINAL = (30, 40, 60, 100)  # sizes of the functional maps before the choice
 _APART = 0.5  # |C - C'| / sqrt(K) from which two functional maps are different maps
@@ -133,9 +134,12 @@ class Multistart(Refiner):
     def _refine(self, matrices: Tensor, sampled: SampledPair, sizes: list[int]) -> Tensor:
         guided, free = Guides(self.descriptor, self.orientation), Guides(self.descriptor, 0.0)
         maps = step(matrices, sampled, guided)
-        for i, size in enumerate(sizes):
-            guides = guided if i < max(1, len(sizes) - _UNGUIDED) else free
-            maps = step(matrices_of(maps, sampled, size), sampled, guides)
+        n_guided = max(1, len(sizes) - _UNGUIDED)
+        for size in sizes[:n_guided]:
+            maps = step(matrices_of(maps, sampled, size), sampled, guided)
+        maps = maps[scores(maps, sampled, sizes[n_guided - 1]).total.argsort()[:_KEPT]]
+        for size in sizes[n_guided:]:
+            maps = step(matrices_of(maps, sampled, size), sampled, free)
         return maps
 
 

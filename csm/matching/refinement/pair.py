@@ -96,3 +96,8 @@ class SampledPair:
     target: Samples
     features_source: Tensor
     features_target: Tensor
+
+    @cached_property
+    def apart(self) -> Tensor:
+        """Squared distances of the features, shape (p, q)."""
+        return torch.cdist(self.features_source, self.features_target).square()
