@@ -12,6 +12,7 @@ from csm.mesh.debris import unit_area
 from csm.mesh.shape import Mesh
 from csm.operators import Spectrum
 from tests.matching.pairs import bent, mirrored, relabelled, spectrum_of
+from tests.matching.peers import need, pyfm_mesh
 from tests.matching.test_orientation import by_faces
 from tests.shapes import blob
 
@@ -144,3 +145,51 @@ def test_the_orientation_term_asks_for_the_meshes(sides):
 def test_negative_weights_are_refused(wrong):
     with pytest.raises(ConfigError, match="at least 0"):
         FitWeights(**wrong)
+
+
+def sizes(x: np.ndarray, y: np.ndarray) -> float:
+    return float((x**2).sum() + (y**2).sum()) / (2 * x.shape[-1])
+
+
+@pytest.mark.peers
+@pytest.mark.parametrize("weights", [FitWeights(0.3, 0, 0), FitWeights(0.1, 0.5, 0), FitWeights(0.1, 0.2, 0.4)])
+def test_it_minimises_the_energies_of_pyfm_and_geomfum(small_humans, weights):
+    """The gradients of both, with their own operators and csm's weights, vanish at csm's minimiser."""
+    k = 12
+    source, target = (side(shape.mesh, waves(shape.mesh, 6), k) for shape in small_humans)
+    found = fit_functional_map(source, target, k, weights)
+    a, b = (s.spectrum.evecs.T @ (s.spectrum.mass[:, None] * s.features) for s in (target, source))
+    mask = (source.spectrum.evals[:, None] - target.spectrum.evals) ** 2
+    products, turns = ([operators(s, k) for s in (target, source)] for operators in (pyfm_products, pyfm_turns))
+    terms = (
+        k / float((a**2).sum()),
+        weights.laplacian / mask.mean(),
+        weights.descriptors / sizes(*products),
+        weights.orientation / sizes(*turns),
+    )
+    slope = need("pyFM.optimize").energy_and_grad_std
+    given = (*terms, a, b, products, turns, mask)
+    energy, gradient = slope(found, *given)
+    at_zero, steepest = slope(np.zeros((k, k)), *given)
+    assert np.linalg.norm(gradient) < 1e-5 * np.linalg.norm(steepest)
+    assert energy < at_zero
+    factors = need("geomfum.functional_map")
+    theirs = [factors.SpectralDescriptorPreservation(a.T, b.T, terms[0])]
+    theirs += [factors.LBCommutativityEnforcing(mask, terms[1])]
+    pairs = [(w, *both) for w, of in zip(terms[2:], (products, turns), strict=True) for both in zip(*of, strict=True)]
+    theirs += [factors.OperatorCommutativityEnforcing(x, y, w) for w, x, y in pairs]
+    total = factors.FactorSum(theirs)
+    assert float(total(found)) == pytest.approx(energy)
+    assert np.linalg.norm(total.gradient(found)) < 1e-5 * np.linalg.norm(steepest)
+
+
+def pyfm_products(given: Side, k: int) -> np.ndarray:
+    phi = given.spectrum.evecs[:, :k]
+    return np.stack([phi.T @ (given.spectrum.mass[:, None] * d[:, None] * phi) for d in given.features.T])
+
+
+def pyfm_turns(given: Side, k: int) -> np.ndarray:
+    """pyFM's orientation operators, of the descriptors as the first k functions see them, as csm smooths them."""
+    phi, mass, mesh = given.spectrum.evecs[:, :k], given.spectrum.mass[:, None], pyfm_mesh(given.mesh)
+    smooth = phi @ (phi.T @ (mass * given.features))
+    return np.stack([phi.T @ (mass * (mesh.orientation_op(mesh.gradient(d)) @ phi)) for d in smooth.T])

@@ -10,6 +10,7 @@ from scipy.spatial.distance import cdist
 from csm.errors import ConfigError
 from csm.matching.functional import FunctionalMap, functional_map, orthogonal, vertex_map
 from tests.matching.pairs import bent, relabelled, spectrum_of
+from tests.matching.peers import geomfum_basis, need, same_map
 from tests.shapes import blob, sphere
 
 
@@ -120,3 +121,26 @@ def test_a_functional_map_pulls_several_functions_and_says_whose_it_is():
     np.testing.assert_allclose(made.pull(functions)[:, 1, 2], matrix @ functions[:, 1, 2])
     assert repr(made) == "FunctionalMap(of a -> b, 3 x 2)"
     assert repr(made.orthogonal()) == repr(made)
+
+
+@pytest.mark.peers
+def test_functional_maps_are_those_of_pyfm_and_geomfum(small_spectra):
+    source, target, truth = small_spectra
+    found = functional_map(truth, source, target, 20, 15)
+    pyfm = need("pyFM.spectral").p2p_to_FM(truth, target.evecs[:, :15], source.evecs[:, :20], A2=source.mass)
+    np.testing.assert_allclose(found, pyfm, atol=1e-10)
+    convert = need("geomfum.convert").FmFromP2pConverter(pseudo_inverse=True)
+    np.testing.assert_allclose(convert(truth, geomfum_basis(target, 15), geomfum_basis(source, 20)), found, atol=1e-10)
+
+
+@pytest.mark.peers
+@pytest.mark.parametrize("adjoint", [False, True])
+def test_vertex_maps_are_those_of_pyfm_and_geomfum(small_spectra, adjoint):
+    """What csm calls the adjoint form is the default of both, and what they call the adjoint is csm's default."""
+    source, target, truth = small_spectra
+    matrix = functional_map(truth, source, target, 20, 15)
+    found = vertex_map(matrix, source, target, adjoint=adjoint)
+    assert same_map(found, need("pyFM.spectral").FM_to_p2p(matrix, target.evecs, source.evecs, use_adj=not adjoint))
+    convert = need("geomfum.convert").P2pFromFmConverter(adjoint=not adjoint)
+    assert same_map(found, convert(matrix, geomfum_basis(target), geomfum_basis(source)))
+    assert not same_map(found, vertex_map(matrix, source, target, adjoint=not adjoint))

@@ -8,6 +8,7 @@ import pytest
 from csm.matching.orientation import cross_gradients, spectral_turns
 from csm.mesh.shape import Mesh
 from tests.matching.pairs import mirrored, spectrum_of
+from tests.matching.peers import pyfm_mesh
 from tests.shapes import blob, plane, rotation, sphere
 
 
@@ -81,3 +82,13 @@ def test_spectral_turns_are_crossed_gradients_without_the_high_frequencies(smoot
     best = np.linalg.lstsq(roots[:, None] * phi, roots * raw, rcond=None)[0]
     np.testing.assert_allclose(found[:, 1, 3], phi @ best, atol=1e-7)
     assert np.abs(found[:, 0]).max() < 1e-9, "the first eigenfunction is constant"
+
+
+@pytest.mark.peers
+def test_it_is_the_orientation_operator_of_pyfm(small_humans):
+    mesh = small_humans[0].mesh
+    f, g = np.random.default_rng(2).normal(size=(2, mesh.n_vertices))
+    theirs = pyfm_mesh(mesh)
+    wanted = theirs.orientation_op(theirs.gradient(f)) @ g
+    found = cross_gradients(mesh, f[:, None], g[:, None])[:, 0, 0]
+    np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-6 * np.abs(wanted).max())

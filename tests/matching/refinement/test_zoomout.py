@@ -7,10 +7,12 @@ import pytest
 from scipy.spatial.distance import cdist
 
 from csm.errors import ConfigError
+from csm.matching.functional import functional_map, orthogonal
 from csm.matching.nearest import Nearest
 from csm.matching.refinement.pair import Pair
 from csm.matching.refinement.zoomout import ICP, Bijective, ZoomOut, adjoint_rows, zoomout_sizes
-from tests.matching.pairs import described, known, relabelled
+from tests.matching.pairs import as_map, described, known, relabelled
+from tests.matching.peers import geomfum_basis, geomfum_converters, need, same_map
 from tests.shapes import blob, cylinder, sphere
 
 
@@ -132,3 +134,49 @@ def test_sizes_end_with_the_last_that_there_is():
 def test_wrong_parameters_are_refused(kind, wrong):
     with pytest.raises(ConfigError, match="wanted"):
         kind(**wrong)
+
+
+@pytest.fixture
+def human_pair(store, small_humans, small_spectra):
+    """The humans with their coordinates for features, a rough start, and what the peers are given."""
+    source, target = (described(shape.mesh, store, shape.mesh.vertices) for shape in small_humans)
+    here, there = (each.embedded.spectrum for each in (source, target))
+    rng = np.random.default_rng(3)
+    truth = small_spectra[2]
+    rough = np.where(rng.random(len(truth)) < 0.3, rng.integers(0, len(here.mass), len(truth)), truth)
+    return as_map(rough, source, target), source, target, here, there
+
+
+@pytest.mark.peers
+@pytest.mark.parametrize(("first", "step", "rounds"), [(20, 5, 8), (30, 1, 10)])
+def test_zoomout_is_that_of_pyfm_and_geomfum(human_pair, first, step, rounds):
+    start, source, target, here, there = human_pair
+    made = ZoomOut(first, first + step * rounds, step, samples=0)(start, source, target)
+    begun = functional_map(start.indices, here, there, first)
+    matrix, wanted = need("pyFM.refine").zoomout_refine(
+        begun, there.evecs, here.evecs, nit=rounds, step=step, A2=here.mass, return_p2p=True
+    )
+    assert same_map(made.forward.indices, wanted)
+    np.testing.assert_allclose(made.functional.matrix, matrix, atol=0.05)
+    refine = need("geomfum.refine").ZoomOut(nit=rounds, step=step, **geomfum_converters())
+    np.testing.assert_allclose(
+        made.functional.matrix, refine(begun, geomfum_basis(there), geomfum_basis(here)), atol=0.05
+    )
+
+
+@pytest.mark.peers
+def test_icp_is_that_of_pyfm_and_geomfum(human_pair):
+    start, source, target, here, there = human_pair
+    made = ICP(25, 6)(start, source, target)
+    begun = orthogonal(functional_map(start.indices, here, there, 25))
+    matrix, wanted = need("pyFM.refine").icp_refine(
+        begun, there.evecs, here.evecs, A2=here.mass, nit=6, return_p2p=True
+    )
+    assert same_map(made.forward.indices, wanted)
+    np.testing.assert_allclose(made.functional.matrix, matrix, atol=0.05)
+    theirs = need("geomfum.refine")
+    rotate = theirs.OrthogonalRefiner(flip_neg_det=False)
+    refine = theirs.IterativeRefiner(nit=6, iter_refiner=rotate, **geomfum_converters())
+    np.testing.assert_allclose(
+        made.functional.matrix, refine(begun, geomfum_basis(there), geomfum_basis(here)), atol=0.05
+    )
