@@ -89,4 +89,4 @@ def make_study(name: str, options: Mapping[str, Any]) -> Study:
 
 def listing() -> str:
     """Return one line per study for ``--help``."""
-    return "\n".join(f"  {name:<14}{found.purpose}" for name, found in STUDIES.items())
+    return "\n".join(f"  {name:<16}{found.purpose}" for name, found in STUDIES.items())
