@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -119,3 +120,13 @@ def test_meshes_of_different_size_and_a_single_feature_are_mapped(store):
 def test_wrong_parameters_are_refused(wrong):
     with pytest.raises(ConfigError, match="wanted"):
         Multistart(**wrong)
+
+
+@pytest.mark.gpu
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a graphics card that PyTorch can use")
+def test_a_graphics_card_gives_the_same_map(store):
+    found = known(store)
+    made = Multistart()(found.start, found.source, found.target).forward.indices
+    source, target = (replace(each, features=each.features.cuda()) for each in (found.source, found.target))
+    assert source.embedded.evecs.is_cuda
+    assert (Multistart()(found.start, source, target).forward.indices == made).mean() > 0.98
