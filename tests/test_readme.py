@@ -15,9 +15,10 @@ from csm.commands.schema import require_valid
 from tests.readme_tables import BLOCK, PAGES, ROOT, with_tables
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+MATCHING = (ROOT / "docs/matching.md").read_text(encoding="utf-8")
 COMMAND_LINES = [
     line.split("#")[0].strip()
-    for block in re.findall(r"```sh\n(.*?)```", README, re.DOTALL)
+    for block in re.findall(r"```sh\n(.*?)```", README + MATCHING, re.DOTALL)
     for line in block.splitlines()
     if line.startswith("csm ")
 ]
@@ -32,6 +33,7 @@ def test_every_table_is_what_its_json_says(page):
 def test_there_are_tables():
     assert BLOCK.search(README)
     assert BLOCK.search((ROOT / "docs/results.md").read_text(encoding="utf-8"))
+    assert BLOCK.search(MATCHING)
 
 
 def test_the_readme_is_a_front_door():

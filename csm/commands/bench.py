@@ -1,4 +1,4 @@
-"""``csm bench descriptors`` and ``csm bench networks``: measure how long things take, by the studies that do."""
+"""``csm bench descriptors``, ``networks`` and ``matching``: measure what things cost, by the studies that do."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from csm.commands.app import command
 from csm.commands.reproduce import make_studies
 from csm.errors import ConfigError
 
-BENCHES = {"descriptors": "table2", "networks": "table6"}
+BENCHES = {"descriptors": "table2", "networks": "table6", "matching": "benchmark_peers"}
 """What can be measured, with the study that does it."""
 
 

@@ -56,6 +56,7 @@ STUDIES: Mapping[str, Entry] = {
     "ablation": _learned("K_s, terms and normalisation of CSMCNN", "ablation", "ablation", "sweeps"),
     "assumptions": Entry("errors when what the sources leave open is chosen otherwise", "training_pairs:Assumptions"),
     "stability": Entry("change of all descriptors across resolutions of one body", "resolutions:Stability"),
+    "benchmark_peers": Entry("errors, seconds and memory of csm, pyFM and geomfum side by side", "peers:Peers"),
 }
 """Name of the study -> its purpose and class.  A new study is one class and one line here."""
 
@@ -90,4 +91,4 @@ def make_study(name: str, options: Mapping[str, Any]) -> Study:
 
 def listing() -> str:
     """Return one line per study for ``--help``."""
-    return "\n".join(f"  {name:<14}{found.purpose}" for name, found in STUDIES.items())
+    return "\n".join(f"  {name:<16}{found.purpose}" for name, found in STUDIES.items())

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +12,7 @@ import torch
 from matplotlib.figure import Figure
 
 from csm._parallel import in_fresh_process
+from csm._peak import peak_megabytes
 from csm._progress import progress_bar
 from csm._types import Arrays
 from csm.data.prepare import prepare_mesh
@@ -149,7 +148,7 @@ def _measure(hparams: Mapping[str, Any], mesh: Mesh, root: str, threads: int, re
     prepared = prepare_mesh(mesh, recipe_of(hparams), Store(root))
     sample = shape_sample(prepared, PointMap.identity(mesh.n_vertices))
     given = NetworkInput(sample.features, sample.surface)
-    before = _peak_megabytes()
+    before = peak_megabytes()
     module = CSMModule(in_channels=sample.features.shape[1], n_classes=mesh.n_vertices, **hparams)
     optimizer = torch.optim.Adam(module.parameters())
     _step(module, optimizer, sample)
@@ -162,7 +161,7 @@ def _measure(hparams: Mapping[str, Any], mesh: Mesh, root: str, threads: int, re
         "train": train["wall"],
         "test": test["wall"],
         "share": (train["cpu"].sum() + test["cpu"].sum()) / (train["wall"].sum() + test["wall"].sum()),
-        "megabytes": _peak_megabytes() - before,
+        "megabytes": peak_megabytes() - before,
     }
     return {key: np.asarray(value) for key, value in found.items()}
 
@@ -172,18 +171,6 @@ def _step(module: CSMModule, optimizer: torch.optim.Optimizer, sample: ShapeSamp
     optimizer.zero_grad()
     module.loss(module(sample.features, sample.surface), sample).backward()  # type: ignore[no-untyped-call]
     optimizer.step()
-
-
-def _peak_megabytes() -> float:
-    status = Path("/proc/self/status")
-    if status.exists():  # on Linux the other count starts from the peak of the process that started this one
-        peak = next((line for line in status.read_text().splitlines() if line.startswith("VmHWM")), "")
-        return float(peak.split()[1]) / 2**10 if peak else float("nan")
-    if sys.platform != "darwin":
-        return float("nan")
-    import resource
-
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
 
 
 def _draw(rows: Rows) -> Figure:

@@ -29,6 +29,14 @@ def test_descriptors_are_table_2_with_its_options(run, monkeypatch):
     assert asked == [(["table2"], [500])]
 
 
+def test_matching_is_the_benchmark_of_peers_with_its_options(run, monkeypatch):
+    asked = []
+    monkeypatch.setattr(bench, "make_studies", lambda cfg, names: asked.append((names, cfg.benchmark_peers)) or {})
+    run("matching", "benchmark_peers.sample=2", "benchmark_peers.methods=[acd]", "hydra.run.dir=job")
+    (((name,), options),) = asked
+    assert (name, options.sample, options.methods, options.repeats) == ("benchmark_peers", 2, ["acd"], 1)
+
+
 @pytest.mark.parametrize("words", [[], ["meshes"]])
 def test_anything_else_is_refused_with_what_there_is(run, capsys, words):
     with pytest.raises(SystemExit) as stopped:

@@ -8,8 +8,7 @@ import pytest
 
 from csm.evaluation.protocol import EvaluationProtocol
 from csm.evaluation.provenance import provenance
-from csm.reproduction import Context, Findings, Study, write_findings
-from csm.reproduction.study import NO_OPTION, OnPoints
+from csm.reproduction.study import NO_OPTION, Context, Findings, OnPoints, Study, write_findings
 from csm.viewer.comparisons import dots_figure
 from tests.reproduction.toys import Toys, measure_no_more, toy_context
 

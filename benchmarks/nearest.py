@@ -1,6 +1,6 @@
 """Time and memory of the nearest neighbours in descriptor space against PyTorch's and SciPy's, all in this run.
 
-    python benchmarks/matching.py --threads 1
+    python benchmarks/nearest.py --threads 1
 
 One pass matches two shapes of FAUST's size by descriptors of a trained network's width, smooth along the surface; one
 row in twenty has a near copy, as left and right of a body do.  The variants take turns; the time is the median, the
@@ -90,7 +90,7 @@ def measure(repeats: int, threads: int) -> list[Row]:
 
 
 def main() -> None:
-    chosen = options("matching", __doc__, list(VARIANTS), repeats=7)
+    chosen = options("nearest", __doc__, list(VARIANTS), repeats=7)
     if chosen.peak_of:
         print(own_peak(chosen.peak_of))
         return
@@ -99,7 +99,7 @@ def main() -> None:
     print(f"{'':<24}{'ms':>8}{'speed-up':>10}{'MB':>8}{'wrong':>10}")
     for row in rows:
         print(f"{row.variant:<24}{row.milliseconds:>8.0f}{row.speedup:>10.2f}{row.megabytes:>8.0f}{row.wrong:>10.2%}")
-    write("matching", chosen, {"n": N, "d": D}, rows)
+    write("nearest", chosen, {"n": N, "d": D}, rows)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,132 @@
+"""Several starts and a choice, on pairs whose map is known."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from csm.errors import ConfigError
+from csm.matching.nearest import Nearest
+from csm.matching.refinement.multistart import Multistart
+from csm.matching.refinement.pair import Pair
+from csm.mesh.shape import Mesh
+from csm.operators.geodesic import geodesics
+from tests.matching.pairs import as_map, described, known, mirrored, relabelled
+from tests.shapes import blob, plane, sphere
+
+
+def beside(one: Mesh, other: Mesh) -> Mesh:
+    vertices = np.concatenate([one.vertices, other.vertices + 5])
+    return Mesh(vertices, np.concatenate([one.faces, other.faces + one.n_vertices]), "two parts")
+
+
+def test_starts_are_all_signs_alone_and_on_the_given_map_and_the_map_itself():
+    matrix = torch.randn(8, 8, generator=torch.Generator().manual_seed(0))
+    starts = Multistart(signs=4).starts(matrix)
+    assert starts.shape == (8 + 8 + 1, 8, 8)
+    np.testing.assert_array_equal(starts[0], np.eye(8))
+    np.testing.assert_array_equal(starts[-1], matrix)
+    signs = {tuple(torch.diagonal(start).int().tolist()) for start in starts[:8]}
+    assert signs == {(1, a, b, c, 1, 1, 1, 1) for a in (1, -1) for b in (1, -1) for c in (1, -1)}
+    u, _, v = torch.linalg.svd(matrix)
+    np.testing.assert_allclose(starts[8:16], starts[:8] @ (u @ v), atol=1e-5)
+    assert Multistart(signs=1).starts(matrix).shape == (3, 8, 8)
+    assert Multistart(signs=6).starts(matrix[:3, :3]).shape == (9, 3, 3), "a tiny shape has fewer signs"
+
+
+def test_a_mesh_goes_to_itself_and_to_a_relabelled_copy_by_the_relabelling(store):
+    mesh = blob(2)
+    other, truth = relabelled(mesh)
+    source, target = described(mesh, store), described(other, store)
+    for there, wanted in ((source, np.arange(len(truth))), (target, truth)):
+        made = Multistart()(Nearest()(source, there), source, there)
+        assert (made.forward.indices == wanted).mean() >= 0.99
+        assert (made.backward.indices[wanted] == np.arange(len(wanted))).mean() >= 0.99
+        assert made.text.startswith("the best of 65 starts")
+
+
+def test_a_start_that_is_wrong_everywhere_is_left_for_a_better_one(store):
+    found = known(store)
+    wrong = np.random.default_rng(0).integers(0, len(found.truth), len(found.truth))
+    made = Multistart()(as_map(wrong, found.source, found.target), found.source, found.target)
+    vertices = found.target.mesh.vertices
+    off = np.linalg.norm(vertices[made.forward.indices] - vertices[found.truth], axis=1)
+    assert off.mean() < 0.1 * np.linalg.norm(vertices[wrong] - vertices[found.truth], axis=1).mean()
+
+
+def test_of_several_finalists_the_best_judged_is_taken(store):
+    found = known(store)
+    pair = Pair.of(found.source, found.target)
+
+    def judged(finalists: int) -> tuple[int, float]:
+        """How many maps were compared, and the sum of the scores of the one that was taken."""
+        _, text = Multistart(finalists=finalists).search(found.start, pair)
+        numbers = re.findall(r"\d+\.\d+|\d+(?= different)", text)
+        return int(numbers[0]), sum(map(float, numbers[1:]))
+
+    (n, alone), (several, best) = judged(1), judged(6)
+    assert n == 1 < several <= 6
+    assert best <= alone + 0.02  # the text rounds
+
+
+def test_a_body_is_mapped_to_its_mirror_image_through_its_own_symmetry(store, small_humans):
+    """Maps keep orientation, so the left hand goes to the left hand as the image has it: the image of the right one."""
+    body = small_humans[0]
+    at, flip = body.truth.indices, body.mirror.indices
+    source, target = described(body.mesh, store), described(mirrored(body.mesh), store)
+    found = Multistart()(Nearest()(source, target), source, target).forward.indices
+    surface = geodesics(target.mesh, "edge")
+    points = np.random.default_rng(0).choice(len(at), 300, replace=False)
+    begin, through, same = at[points], flip[points], at[points]
+    diameter = surface.diameter()
+    assert surface.pairs(through, found[begin]).mean() < 0.03 * diameter
+    assert surface.pairs(same, found[begin]).mean() > 0.2 * diameter
+
+
+@pytest.mark.parametrize(
+    "meshes",
+    [(sphere(0), sphere(0)), (plane(9), plane(9)), (beside(blob(1), sphere(1)), beside(blob(1), sphere(1)))],
+    ids=["12 vertices", "open", "two components"],
+)
+def test_small_open_and_divided_meshes_go_to_themselves(store, meshes):
+    source, target = (described(mesh, store, mesh.vertices) for mesh in meshes)
+    made = Multistart()(Nearest()(source, target), source, target)
+    vertices = meshes[1].vertices
+    off = np.linalg.norm(vertices[made.forward.indices] - vertices, axis=1)
+    spread = np.linalg.norm(vertices - vertices.mean(0), axis=1).mean()
+    assert off.mean() < 0.2 * spread
+
+
+def test_meshes_of_different_size_and_a_single_feature_are_mapped(store):
+    meshes = blob(2), sphere(1)
+    source, target = (described(mesh, store, mesh.vertices[:, :1]) for mesh in meshes)
+    made = Multistart()(Nearest()(source, target), source, target)
+    assert made.forward.indices.shape == (162,)
+    assert made.backward.indices.shape == (42,)
+    assert made.forward.n_target == 42
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        *({"signs": 0}, {"signs": 9}, {"samples": 9}, {"finalists": 0}, {"descriptor": -1}, {"orientation": -1}),
+        *({"orientation": float("nan")}, {"weight": -1}, {"schedule": (5, 4)}),
+    ],
+)
+def test_wrong_parameters_are_refused(wrong):
+    with pytest.raises(ConfigError, match="wanted"):
+        Multistart(**wrong)
+
+
+@pytest.mark.gpu
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a graphics card that PyTorch can use")
+def test_a_graphics_card_gives_the_same_map(store):
+    found = known(store)
+    made = Multistart()(found.start, found.source, found.target).forward.indices
+    source, target = (replace(each, features=each.features.cuda()) for each in (found.source, found.target))
+    assert source.embedded.evecs.is_cuda
+    assert (Multistart()(found.start, source, target).forward.indices == made).mean() > 0.98
