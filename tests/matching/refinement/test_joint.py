@@ -37,8 +37,8 @@ def test_it_is_what_plain_numpy_makes(store, weight, orthogonal):
     found = known(store)
     made = Joint((8, 12, 20), weight, orthogonal)(found.start, found.source, found.target)
     wanted, matrix = plain(found, (8, 12, 20), weight, orthogonal)
-    assert (made.forward.indices == wanted).mean() > 0.99
-    np.testing.assert_allclose(made.functional.matrix, matrix, atol=0.02)
+    assert (made.forward.vertex_map.indices == wanted).mean() > 0.99
+    np.testing.assert_allclose(made.forward.functional_map.matrix, matrix, atol=0.02)
     assert "3 steps, to functional maps of 20 functions" in made.text
 
 
@@ -46,7 +46,7 @@ def test_it_mends_a_start_and_keeps_what_the_descriptor_knows(store):
     found = known(store)
     made = Joint()(found.start, found.source, found.target)
     mesh = found.target.mesh
-    off = np.linalg.norm(mesh.vertices[made.forward.indices] - mesh.vertices[found.truth], axis=1)
+    off = np.linalg.norm(mesh.vertices[made.forward.vertex_map.indices] - mesh.vertices[found.truth], axis=1)
     begun = np.linalg.norm(mesh.vertices[found.start.indices] - mesh.vertices[found.truth], axis=1)
     assert off.mean() < 0.2 * begun.mean()
     back = made.forward.compose(made.backward).indices
@@ -60,18 +60,18 @@ def test_a_mesh_goes_to_itself_and_to_a_relabelled_copy_by_the_relabelling(store
     for there, wanted in ((source, np.arange(len(truth))), (target, truth)):
         start = Nearest()(source, there)
         made = Joint()(start, source, there)
-        assert (made.forward.indices == wanted).mean() >= 0.99
-        assert (made.backward.indices[wanted] == np.arange(len(wanted))).mean() >= 0.99
+        assert (made.forward.vertex_map.indices == wanted).mean() >= 0.99
+        assert (made.backward.vertex_map.indices[wanted] == np.arange(len(wanted))).mean() >= 0.99
 
 
 @pytest.mark.parametrize("meshes", [(sphere(0), sphere(0)), (plane(8), plane(8)), (blob(2), sphere(1))])
 def test_small_open_and_different_meshes_are_mapped(store, meshes):
     source, target = (described(mesh, store, mesh.vertices[:, :1]) for mesh in meshes)
     made = Joint()(Nearest()(source, target), source, target)
-    assert made.forward.indices.shape == (meshes[0].n_vertices,)
-    assert made.backward.indices.shape == (meshes[1].n_vertices,)
+    assert made.forward.vertex_map.indices.shape == (meshes[0].n_vertices,)
+    assert made.backward.vertex_map.indices.shape == (meshes[1].n_vertices,)
     k = min(source.embedded.k, target.embedded.k)
-    assert made.functional.matrix.shape == (min(k, 30), min(k, 30))
+    assert made.forward.functional_map.matrix.shape == (min(k, 30), min(k, 30))
 
 
 def test_a_start_with_gaps_is_enough(store):
@@ -79,7 +79,7 @@ def test_a_start_with_gaps_is_enough(store):
     gaps = np.where(np.arange(len(found.truth)) % 2, -1, found.truth)
     made = Joint()(as_map(gaps, found.source, found.target), found.source, found.target)
     whole = Joint()(found.start, found.source, found.target)
-    assert (made.forward.indices == whole.forward.indices).mean() > 0.9
+    assert (made.forward.vertex_map.indices == whole.forward.vertex_map.indices).mean() > 0.9
 
 
 def test_first_matrix_is_that_of_the_given_map(store):

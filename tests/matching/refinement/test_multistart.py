@@ -44,8 +44,8 @@ def test_a_mesh_goes_to_itself_and_to_a_relabelled_copy_by_the_relabelling(store
     source, target = described(mesh, store), described(other, store)
     for there, wanted in ((source, np.arange(len(truth))), (target, truth)):
         made = Multistart()(Nearest()(source, there), source, there)
-        assert (made.forward.indices == wanted).mean() >= 0.99
-        assert (made.backward.indices[wanted] == np.arange(len(wanted))).mean() >= 0.99
+        assert (made.forward.vertex_map.indices == wanted).mean() >= 0.99
+        assert (made.backward.vertex_map.indices[wanted] == np.arange(len(wanted))).mean() >= 0.99
         assert made.text.startswith("the best of 65 starts")
 
 
@@ -54,7 +54,7 @@ def test_a_start_that_is_wrong_everywhere_is_left_for_a_better_one(store):
     wrong = np.random.default_rng(0).integers(0, len(found.truth), len(found.truth))
     made = Multistart()(as_map(wrong, found.source, found.target), found.source, found.target)
     vertices = found.target.mesh.vertices
-    off = np.linalg.norm(vertices[made.forward.indices] - vertices[found.truth], axis=1)
+    off = np.linalg.norm(vertices[made.forward.vertex_map.indices] - vertices[found.truth], axis=1)
     assert off.mean() < 0.1 * np.linalg.norm(vertices[wrong] - vertices[found.truth], axis=1).mean()
 
 
@@ -78,7 +78,7 @@ def test_a_body_is_mapped_to_its_mirror_image_through_its_own_symmetry(store, sm
     body = small_humans[0]
     at, flip = body.truth.indices, body.mirror.indices
     source, target = described(body.mesh, store), described(mirrored(body.mesh), store)
-    found = Multistart()(Nearest()(source, target), source, target).forward.indices
+    found = Multistart()(Nearest()(source, target), source, target).forward.vertex_map.indices
     surface = geodesics(target.mesh, "edge")
     points = np.random.default_rng(0).choice(len(at), 300, replace=False)
     begin, through, same = at[points], flip[points], at[points]
@@ -96,7 +96,7 @@ def test_small_open_and_divided_meshes_go_to_themselves(store, meshes):
     source, target = (described(mesh, store, mesh.vertices) for mesh in meshes)
     made = Multistart()(Nearest()(source, target), source, target)
     vertices = meshes[1].vertices
-    off = np.linalg.norm(vertices[made.forward.indices] - vertices, axis=1)
+    off = np.linalg.norm(vertices[made.forward.vertex_map.indices] - vertices, axis=1)
     spread = np.linalg.norm(vertices - vertices.mean(0), axis=1).mean()
     assert off.mean() < 0.2 * spread
 
@@ -105,8 +105,8 @@ def test_meshes_of_different_size_and_a_single_feature_are_mapped(store):
     meshes = blob(2), sphere(1)
     source, target = (described(mesh, store, mesh.vertices[:, :1]) for mesh in meshes)
     made = Multistart()(Nearest()(source, target), source, target)
-    assert made.forward.indices.shape == (162,)
-    assert made.backward.indices.shape == (42,)
+    assert made.forward.vertex_map.indices.shape == (162,)
+    assert made.backward.vertex_map.indices.shape == (42,)
     assert made.forward.n_target == 42
 
 
@@ -126,7 +126,7 @@ def test_wrong_parameters_are_refused(wrong):
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a graphics card that PyTorch can use")
 def test_a_graphics_card_gives_the_same_map(store):
     found = known(store)
-    made = Multistart()(found.start, found.source, found.target).forward.indices
+    made = Multistart()(found.start, found.source, found.target).forward.vertex_map.indices
     source, target = (replace(each, features=each.features.cuda()) for each in (found.source, found.target))
     assert source.embedded.evecs.is_cuda
-    assert (Multistart()(found.start, source, target).forward.indices == made).mean() > 0.98
+    assert (Multistart()(found.start, source, target).forward.vertex_map.indices == made).mean() > 0.98

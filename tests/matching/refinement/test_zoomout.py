@@ -41,8 +41,8 @@ def test_zoomout_is_what_plain_numpy_makes(store, step):
         matrix = pulled(indices, phi, psi, mass, k)
         indices = adjoint_map(matrix, phi, psi).argmin(1)
     made = ZoomOut(10, 25, step, samples=0)(found.start, found.source, found.target)
-    assert (made.forward.indices == indices).mean() > 0.99
-    np.testing.assert_allclose(made.functional.matrix, matrix, atol=0.02)
+    assert (made.forward.vertex_map.indices == indices).mean() > 0.99
+    np.testing.assert_allclose(made.forward.functional_map.matrix, matrix, atol=0.02)
 
 
 def test_icp_is_what_plain_numpy_makes(store):
@@ -54,9 +54,9 @@ def test_icp_is_what_plain_numpy_makes(store):
         matrix = u @ v
         indices = adjoint_map(matrix, phi, psi).argmin(1)
     made = ICP(12, 3)(found.start, found.source, found.target)
-    assert (made.forward.indices == indices).mean() > 0.99
-    np.testing.assert_allclose(made.functional.matrix, matrix, atol=0.02)
-    np.testing.assert_allclose(made.functional.matrix @ made.functional.matrix.T, np.eye(12), atol=1e-5)
+    assert (made.forward.vertex_map.indices == indices).mean() > 0.99
+    np.testing.assert_allclose(made.forward.functional_map.matrix, matrix, atol=0.02)
+    np.testing.assert_allclose(made.forward.functional_map.matrix @ made.forward.functional_map.matrix.T, np.eye(12), atol=1e-5)
 
 
 def test_bijective_zoomout_solves_for_both_maps_together(store):
@@ -71,9 +71,9 @@ def test_bijective_zoomout_solves_for_both_maps_together(store):
         matrix = np.linalg.lstsq(left, right, rcond=None)[0]
     distances = adjoint_map(matrix, phi, psi)
     made = Bijective(10, 20, 5)(found.start, found.source, found.target)
-    np.testing.assert_allclose(made.functional.matrix, matrix, atol=0.02)
-    assert (made.forward.indices == distances.argmin(1)).mean() > 0.99
-    assert (made.backward.indices == distances.argmin(0)).mean() > 0.99
+    np.testing.assert_allclose(made.forward.functional_map.matrix, matrix, atol=0.02)
+    assert (made.forward.vertex_map.indices == distances.argmin(1)).mean() > 0.99
+    assert (made.backward.vertex_map.indices == distances.argmin(0)).mean() > 0.99
 
 
 def test_rows_of_the_adjoint_form(store):
@@ -90,7 +90,7 @@ def test_a_relabelled_copy_is_mapped_by_the_relabelling(store, refiner):
     other, truth = relabelled(mesh)
     source, target = described(mesh, store), described(other, store)
     made = refiner(Nearest()(source, target), source, target)
-    assert (made.forward.indices == truth).mean() >= 0.99
+    assert (made.forward.vertex_map.indices == truth).mean() >= 0.99
 
 
 @pytest.mark.parametrize("refiner", [ZoomOut(10, 25, 5, samples=80), ICP(15), Bijective(10, 25, 5)])
@@ -102,7 +102,7 @@ def test_each_mends_a_start(store, refiner):
         return float(np.linalg.norm(vertices[indices] - vertices[found.truth], axis=1).mean())
 
     made = refiner(found.start, found.source, found.target)
-    assert off(made.forward.indices) < 0.4 * off(found.start.indices)
+    assert off(made.forward.vertex_map.indices) < 0.4 * off(found.start.indices)
     assert (made.forward.source, made.forward.target) == ("blob", found.target.mesh.name)
 
 
@@ -111,9 +111,9 @@ def test_each_mends_a_start(store, refiner):
 def test_small_and_open_meshes_are_mapped(store, refiner, meshes):
     source, target = (described(mesh, store, mesh.vertices) for mesh in meshes)
     made = refiner(Nearest()(source, target), source, target)
-    assert made.forward.indices.shape == (meshes[0].n_vertices,)
+    assert made.forward.vertex_map.indices.shape == (meshes[0].n_vertices,)
     k = min(source.embedded.k, target.embedded.k)
-    assert made.functional.matrix.shape == (k, k)
+    assert made.forward.functional_map.matrix.shape == (k, k)
 
 
 def test_sizes_end_with_the_last_that_there_is():
@@ -156,11 +156,11 @@ def test_zoomout_is_that_of_pyfm_and_geomfum(human_pair, first, step, rounds):
     matrix, wanted = need("pyFM.refine").zoomout_refine(
         begun, there.evecs, here.evecs, nit=rounds, step=step, A2=here.mass, return_p2p=True
     )
-    assert same_map(made.forward.indices, wanted)
-    np.testing.assert_allclose(made.functional.matrix, matrix, atol=0.05)
+    assert same_map(made.forward.vertex_map.indices, wanted)
+    np.testing.assert_allclose(made.forward.functional_map.matrix, matrix, atol=0.05)
     refine = need("geomfum.refine").ZoomOut(nit=rounds, step=step, **geomfum_converters())
     np.testing.assert_allclose(
-        made.functional.matrix, refine(begun, geomfum_basis(there), geomfum_basis(here)), atol=0.05
+        made.forward.functional_map.matrix, refine(begun, geomfum_basis(there), geomfum_basis(here)), atol=0.05
     )
 
 
@@ -172,11 +172,11 @@ def test_icp_is_that_of_pyfm_and_geomfum(human_pair):
     matrix, wanted = need("pyFM.refine").icp_refine(
         begun, there.evecs, here.evecs, A2=here.mass, nit=6, return_p2p=True
     )
-    assert same_map(made.forward.indices, wanted)
-    np.testing.assert_allclose(made.functional.matrix, matrix, atol=0.05)
+    assert same_map(made.forward.vertex_map.indices, wanted)
+    np.testing.assert_allclose(made.forward.functional_map.matrix, matrix, atol=0.05)
     theirs = need("geomfum.refine")
     rotate = theirs.OrthogonalRefiner(flip_neg_det=False)
     refine = theirs.IterativeRefiner(nit=6, iter_refiner=rotate, **geomfum_converters())
     np.testing.assert_allclose(
-        made.functional.matrix, refine(begun, geomfum_basis(there), geomfum_basis(here)), atol=0.05
+        made.forward.functional_map.matrix, refine(begun, geomfum_basis(there), geomfum_basis(here)), atol=0.05
     )
