@@ -85,12 +85,26 @@ def match(
     require_device(device)
     here, there = (chosen.describe(subject.cleaned.mesh, store, device) for subject in subjects)
     forward, backward, text = _ways(rule, improver, here, there)
-    forward, backward = on_given(forward, subjects[0], subjects[1]), on_given(backward, subjects[1], subjects[0])
-    given = subjects[0].given, subjects[1].given
-    confidence = there_and_back(forward.vertex_map, backward.vertex_map, given[0])
-    features = _on_given_rows(here, subjects[0]), _on_given_rows(there, subjects[1])
     made = rule if improver is None else Refined(rule, improver)
-    return Match(*given, forward, backward, confidence, chosen, made, _notes(*subjects), text, features)
+    return match_of(forward, backward, (subjects[0], subjects[1]), (here, there), chosen, made, text)
+
+
+def match_of(
+    forward: Way,
+    backward: Way,
+    subjects: tuple[Subject, Subject],
+    described: tuple[Described, Described],
+    method: Method,
+    matcher: Matcher,
+    text: str,
+) -> Match:
+    """Return the match of the ways between two cleaned meshes, on the vertices as they were given."""
+    source, target = subjects
+    forward, backward = on_given(forward, source, target), on_given(backward, target, source)
+    confidence = there_and_back(forward.vertex_map, backward.vertex_map, source.given)
+    features = _on_given_rows(described[0], source), _on_given_rows(described[1], target)
+    notes = _notes(source, target)
+    return Match(source.given, target.given, forward, backward, confidence, method, matcher, notes, text, features)
 
 
 match_meshes = match
