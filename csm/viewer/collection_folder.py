@@ -33,7 +33,7 @@ ALL_UP_TO = 20
 """Number of shapes up to which the maps of all pairs are written unless something else is asked for."""
 
 Pairs: TypeAlias = Literal["auto", "all", "reference"]
-"""Which maps are written: of all ordered pairs, or to and from the reference; "auto" decides by the number of shapes."""
+"""Which maps are written: of all ordered pairs, or to and from the reference; "auto" decides by their number."""
 
 _SHOWN = 12  # shapes in the page
 _OWN = re.compile(r"maps/[^/]+_to_[^/]+\.txt|shapes/[^/]+\.ply")
@@ -141,9 +141,7 @@ def chosen_pairs(n: int, reference: int, pairs: str) -> list[tuple[int, int]]:
     return [pair for pair in every if reference in pair]
 
 
-def _write_files(
-    collection: MatchedCollection, indices: Mapping[tuple[int, int], IntArray], folder: Path
-) -> list[str]:
+def _write_files(collection: MatchedCollection, indices: Mapping[tuple[int, int], IntArray], folder: Path) -> list[str]:
     """Write all files but the account; return their names relative to the folder."""
     names, meshes, middle = collection.names, collection.meshes, collection.reference_index
     reference = position_colors(meshes[middle])

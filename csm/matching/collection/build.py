@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import torch
-from scipy.sparse import coo_matrix
+from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import shortest_path
 
 from csm._parallel import n_processes, parallel_map
@@ -262,5 +262,5 @@ def medoid(pairs: IntArray, costs: FloatArray, n: int) -> int:
     >>> medoid(np.array([[0, 1], [1, 2]]), np.ones(2), 3)
     1
     """
-    lengths = shortest_path(coo_matrix((np.maximum(costs, 1e-9), pairs.T), shape=(n, n)), directed=False)
+    lengths = shortest_path(csr_matrix((np.maximum(costs, 1e-9), pairs.T), shape=(n, n)), directed=False)
     return int(lengths.sum(1).argmin())
