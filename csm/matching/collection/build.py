@@ -20,8 +20,9 @@ from csm.descriptors.base import Descriptor
 from csm.errors import ConfigError, DataError
 from csm.matching.base import Described, require_device
 from csm.matching.collection.candidates import Candidates, joined, stacked
+from csm.matching.collection.climb import SIZES, consistent
 from csm.matching.collection.graph import pairs_of
-from csm.matching.collection.members import EdgeTask, Member, candidates_of
+from csm.matching.collection.members import EdgeTask, Member, candidates_of, finer_map
 from csm.matching.collection.result import Cycles, Edge, MatchedCollection
 from csm.matching.collection.synchronise import SCALE, Agreement, agree, apart, composed, triangle_errors
 from csm.matching.embedded import n_eigenfunctions
@@ -61,8 +62,9 @@ def match_collection(
 
     A pair by itself may end with limbs exchanged.  Here some pairs are matched by several starts each, all of whose
     ends are kept; of these the ones are chosen with which cycles of shapes close, the functional maps are made to close
-    every cycle exactly (`csm.matching.collection.synchronise`), what they say of each pair is refined and judged beside
-    its own candidates, and the choice is made once more.
+    every cycle exactly (`csm.matching.collection.synchronise`), what they say of each doubtful pair is refined and
+    judged beside its own candidates, and the choice is made once more.  All maps then become finer together
+    (`csm.matching.collection.climb`).
 
     Parameters
     ----------
@@ -107,9 +109,10 @@ def match_collection(
         triangle_errors(alone.maps[each, best], pairs, n)[1],
         triangle_errors(both.maps[each, agreement.choice], pairs, n)[1],
     )
+    bases = _finer(members, agreement.bases, pairs, refiner, run)
     edges = _edges(alone, agreement, pairs, [subject.given.name for subject in subjects])
     middle = medoid(pairs, both.costs[each, agreement.choice] + agreement.apart, n)
-    return MatchedCollection(subjects, members, agreement, edges, cycles, chosen, refiner, middle)
+    return MatchedCollection(subjects, members, bases, edges, cycles, chosen, refiner, middle)
 
 
 def named_shapes(shapes: Shapes) -> dict[str, MeshLike]:
@@ -242,6 +245,19 @@ def _candidates(
         more.maps[edge], more.costs[edge] = one.maps, one.costs
     both = joined(alone, more)
     return alone, both, agree(both.maps, both.costs, pairs, len(members)) if again else first
+
+
+def _finer(members: Sequence[Member], bases: FloatArray, pairs: IntArray, refiner: Multistart, run: _Run) -> FloatArray:
+    """Return the bases of consistent maps that are as fine as the eigenfunctions of all shapes allow."""
+    most = min(*(n_eigenfunctions(member.mesh) for member in members), refiner.schedule[-1])
+    for size in (size for size in SIZES if bases.shape[-1] < size <= most):
+        now = composed(bases, pairs)
+        tasks = [
+            EdgeTask(members[i], members[j], refiner, size, one[None]) for (i, j), one in zip(pairs, now, strict=True)
+        ]
+        maps = np.stack(run(finer_map, tasks, EdgeTask.label_of, f"refine to {size}", "pair"))
+        bases = consistent(maps, pairs, 2 * SCALE, len(members))
+    return bases
 
 
 def _edges(alone: Candidates, agreement: Agreement, pairs: IntArray, names: Sequence[str]) -> tuple[Edge, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from csm._types import Float32Array, FloatArray, IntArray
 from csm.data.store import Store
 from csm.matching.base import Described
 from csm.matching.collection.candidates import Candidates, judge, search
+from csm.matching.collection.climb import finer
 from csm.matching.embedded import Embedded
 from csm.matching.maps import VertexMap
 from csm.matching.refinement.base import RefinedMap
@@ -85,9 +86,16 @@ def candidates_of(task: EdgeTask) -> Candidates:
     return judge(task.maps, task.pair(), task.refiner, task.k)
 
 
+def finer_map(task: EdgeTask) -> FloatArray:
+    """Return the first of the task's maps at the task's size, see `csm.matching.collection.climb.finer`."""
+    assert task.maps is not None
+    return finer(task.maps[0], task.pair(), task.refiner.climb, task.k)
+
+
 def finest(matrix: FloatArray, pair: Pair, climb: Climb, text: str = "") -> RefinedMap:
     """Return the maps of all vertices in both directions, by a climb from a functional map (K, K)."""
-    names = pair.source.mesh.name, pair.target.mesh.name
+    names, k = (pair.source.mesh.name, pair.target.mesh.name), len(matrix)
+    climb = replace(climb, schedule=tuple(size for size in climb.schedule if size >= k) or (k,))
     start = VertexMap(np.zeros(0, dtype=np.int64), pair.target.mesh.n_vertices, *names)
     given = torch.from_numpy(np.ascontiguousarray(matrix)).float().to(pair.source.device)
     return finished(climb(given, pair), pair, climb, start, text)

@@ -14,7 +14,6 @@ from csm._places import load
 from csm._types import FloatArray, IntArray
 from csm.errors import ConfigError
 from csm.matching.collection.members import EdgeTask, Member, both_maps, finest
-from csm.matching.collection.synchronise import Agreement
 from csm.matching.functional import FunctionalMap
 from csm.matching.maps import VertexMap
 from csm.matching.match import match_of
@@ -78,8 +77,8 @@ class MatchedCollection:
     ----------
     subjects, members
         The shapes as they were given and as they are computed with.
-    agreement
-        The functional maps, as one orthogonal matrix per shape.
+    bases
+        Shape (n, K, K), orthogonal: one matrix Y_i per shape, of which the functional map i -> j is Y_i Y_j^T.
     edges
         The pairs that were matched by themselves.
     cycles
@@ -92,7 +91,7 @@ class MatchedCollection:
 
     subjects: tuple[Subject, ...]
     members: tuple[Member, ...]
-    agreement: Agreement
+    bases: FloatArray
     edges: tuple[Edge, ...]
     cycles: Cycles
     method: Method
@@ -122,7 +121,7 @@ class MatchedCollection:
     @property
     def text(self) -> str:
         """How it was made, in words."""
-        k = self.agreement.bases.shape[-1]
+        k = self.bases.shape[-1]
         return (
             f"{len(self.names)} shapes, {len(self.edges)} pairs of them matched by several starts; {len(self.mended)} "
             f"of these maps did not agree with the others and were replaced; functional maps of {k} functions that "
@@ -141,14 +140,14 @@ class MatchedCollection:
     def functional_map(self, source: Which, target: Which) -> FunctionalMap:
         """Return the functional map that the collection agreed on, before it becomes finer."""
         i, j = self.number(source), self.number(target)
-        return FunctionalMap(self.agreement.map(i, j), self.names[i], self.names[j])
+        return FunctionalMap(self._matrix(i, j), self.names[i], self.names[j])
 
     def match(self, source: Which, target: Which) -> Match:
         """Return the match of two shapes, with all that `csm.match` returns."""
         i, j = self.number(source), self.number(target)
         described = self.members[i].described(), self.members[j].described()
         pair = Pair.of(*described)
-        found = finest(self.agreement.map(i, j), pair, self.refiner.climb)
+        found = finest(self._matrix(i, j), pair, self.refiner.climb)
         assert found.backward is not None
         rule = Refined(Nearest(), self.refiner)
         subjects = self.subjects[i], self.subjects[j]
@@ -188,8 +187,11 @@ class MatchedCollection:
         saver: Callable[..., Path] = load("csm.viewer.collection_folder:save_collection")
         return saver(self, folder, pairs=pairs, overwrite=overwrite)
 
+    def _matrix(self, i: int, j: int) -> FloatArray:
+        return self.bases[i] @ self.bases[j].T
+
     def _task(self, i: int, j: int) -> EdgeTask:
-        maps = self.agreement.map(i, j)[None]
+        maps = self._matrix(i, j)[None]
         return EdgeTask(self.members[i], self.members[j], self.refiner, maps.shape[-1], maps)
 
     def _given(self, i: int, j: int, indices: IntArray) -> VertexMap:

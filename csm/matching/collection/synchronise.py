@@ -64,7 +64,8 @@ class Agreement:
 def polar(matrices: FloatArray) -> FloatArray:
     """Return the nearest orthogonal matrices (..., K, K)."""
     u, _, v = np.linalg.svd(matrices)
-    return np.asarray(u @ v)
+    factors: FloatArray = u @ v
+    return factors
 
 
 def apart(first: FloatArray, second: FloatArray) -> FloatArray:
@@ -171,7 +172,7 @@ def agree(candidates: FloatArray, costs: FloatArray, pairs: IntArray, n: int) ->
     each = np.arange(len(pairs))
     for step in range(_ROUNDS):
         choice, away = _chosen(bases, candidates, gaps, pairs)
-        maps, weights = candidates[each, choice], _robust(away)
+        maps, weights = candidates[each, choice], robust(away)
         bases = polished(bases, maps, pairs, weights) if step else synchronise(maps, pairs, weights, n)
     return Agreement(bases, *_chosen(bases, candidates, gaps, pairs))
 
@@ -223,13 +224,19 @@ def _objective(error: FloatArray, gaps: FloatArray) -> FloatArray:
 
 def _loss(error: FloatArray) -> FloatArray:
     """Return the loss of Geman and McClure, from 0 to 1."""
-    square = (error / SCALE) ** 2
-    return np.asarray(square / (1 + square))
+    square: FloatArray = (error / SCALE) ** 2
+    return square / (1 + square)
 
 
-def _robust(error: FloatArray) -> FloatArray:
-    """Return the weights of Geman and McClure, at least 1e-4 so that the graph stays connected."""
-    weights: FloatArray = np.maximum(1 / (1 + (error / SCALE) ** 2) ** 2, 1e-4)
+def robust(error: FloatArray, scale: float = SCALE) -> FloatArray:
+    """Return the weights of Geman and McClure, at least 1e-4 so that the graph stays connected.
+
+    Examples
+    --------
+    >>> robust(np.array([0.0, 1.0]), scale=1.0)
+    array([1.  , 0.25])
+    """
+    weights: FloatArray = np.maximum(1 / (1 + (error / scale) ** 2) ** 2, 1e-4)
     return weights
 
 

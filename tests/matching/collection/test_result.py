@@ -42,7 +42,7 @@ def test_functional_maps_close_every_cycle_and_are_orthogonal(found):
     assert np.allclose(ab @ bc @ ca, np.eye(len(ab)), atol=1e-8)
 
 
-@pytest.mark.parametrize("workers", [0, 2])
+@pytest.mark.parametrize("workers", [0, pytest.param(2, marks=pytest.mark.slow)])
 def test_many_maps_are_those_made_one_by_one(found, workers):
     every = found.vertex_maps(workers=workers, progress=False)
     assert [(m.source, m.target) for m in every][:3] == [("s0", "s1"), ("s0", "s2"), ("s1", "s0")]
