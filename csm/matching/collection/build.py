@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -41,8 +41,8 @@ MENDED = 0.4
 
 _ARRAYS = (".npz", ".mat")  # of files, which may hold something else than a mesh
 
-Shapes: TypeAlias = str | os.PathLike[str] | Sequence[MeshLike] | Mapping[str, MeshLike]
-"""A folder, meshes in any form that `csm.match` takes, or such by name."""
+Shapes: TypeAlias = str | os.PathLike[str] | Sequence[MeshLike]
+"""A folder, or meshes in any form that `csm.match` takes."""
 
 
 def match_collection(
@@ -102,7 +102,19 @@ def match_collection(
     _require_names(subjects)
     run = _Run(workers if device == "cpu" else 0, progress)
     members = _described(subjects, chosen, store, device, run)
-    pairs, n = _graph(members, near, far), len(members)
+    return _matched(subjects, members, chosen, refiner, _graph(members, near, far), run)
+
+
+def _matched(
+    subjects: tuple[Subject, ...],
+    members: tuple[Member, ...],
+    method: Method,
+    refiner: Multistart,
+    pairs: IntArray,
+    run: _Run,
+) -> MatchedCollection:
+    """Match the pairs of described shapes and make their maps agree."""
+    n = len(members)
     alone, both, agreement = _candidates(members, pairs, refiner, run)
     each, best = np.arange(len(pairs)), alone.costs.argmin(1)
     cycles = Cycles(
@@ -112,7 +124,7 @@ def match_collection(
     bases = _finer(members, agreement.bases, pairs, refiner, run)
     edges = _edges(alone, agreement, pairs, [subject.given.name for subject in subjects])
     middle = medoid(pairs, both.costs[each, agreement.choice] + agreement.apart, n)
-    return MatchedCollection(subjects, members, bases, edges, cycles, chosen, refiner, middle)
+    return MatchedCollection(subjects, members, bases, edges, cycles, method, refiner, middle)
 
 
 def named_shapes(shapes: Shapes) -> dict[str, MeshLike]:
@@ -127,7 +139,7 @@ def named_shapes(shapes: Shapes) -> dict[str, MeshLike]:
     """
     if isinstance(shapes, str | os.PathLike):
         return {path.name: path for path in mesh_files(shapes)}
-    found = dict(shapes) if isinstance(shapes, Mapping) else {f"shape{i}": mesh for i, mesh in enumerate(shapes)}
+    found = {f"shape{i}": mesh for i, mesh in enumerate(shapes)}
     if len(found) < 2:
         raise ConfigError(f"a collection of {len(found)} shapes: wanted two or more")
     return found

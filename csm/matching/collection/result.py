@@ -188,7 +188,8 @@ class MatchedCollection:
         return saver(self, folder, pairs=pairs, overwrite=overwrite)
 
     def _matrix(self, i: int, j: int) -> FloatArray:
-        return self.bases[i] @ self.bases[j].T
+        matrix: FloatArray = self.bases[i] @ self.bases[j].T
+        return matrix
 
     def _task(self, i: int, j: int) -> EdgeTask:
         maps = self._matrix(i, j)[None]

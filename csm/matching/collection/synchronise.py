@@ -64,8 +64,7 @@ class Agreement:
 def polar(matrices: FloatArray) -> FloatArray:
     """Return the nearest orthogonal matrices (..., K, K)."""
     u, _, v = np.linalg.svd(matrices)
-    factors: FloatArray = u @ v
-    return factors
+    return np.matmul(u, v).astype(np.float64)
 
 
 def apart(first: FloatArray, second: FloatArray) -> FloatArray:
@@ -241,5 +240,4 @@ def robust(error: FloatArray, scale: float = SCALE) -> FloatArray:
 
 
 def _degrees(pairs: IntArray, weights: FloatArray, n: int) -> FloatArray:
-    degrees: FloatArray = np.bincount(pairs.ravel(), np.repeat(weights, 2), n)
-    return degrees
+    return np.bincount(pairs.ravel(), np.repeat(weights, 2), n).astype(np.float64)

@@ -39,9 +39,10 @@ def test_a_broken_pair_is_mended_by_the_others(store, monkeypatch):
 
 
 def test_two_shapes_are_a_collection(store):
-    shapes = dict(zip("ab", copies(2), strict=True))
+    first, second = copies(2)
+    shapes = [(first.vertices, first.faces), second]
     found = csm.match_collection(shapes, "wks", refiner=QUICK, store=store, workers=0, progress=False)
-    assert found.names == ("s0", "s1")
+    assert found.names == ("shape0", "s1")
     assert len(found.edges) == 1
     assert share_right(found.vertex_map(0, 1).indices, 0, 1, 2) > 0.95
 
