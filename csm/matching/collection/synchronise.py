@@ -58,13 +58,15 @@ class Agreement:
 
     def map(self, i: int, j: int) -> FloatArray:
         """Return the functional map (K, K) of the map i -> j."""
-        return composed(self.bases, np.array([[i, j]]))[0]
+        matrix: FloatArray = self.bases[i] @ self.bases[j].T
+        return matrix
 
 
 def polar(matrices: FloatArray) -> FloatArray:
     """Return the nearest orthogonal matrices (..., K, K)."""
     u, _, v = np.linalg.svd(matrices)
-    return np.matmul(u, v).astype(np.float64)
+    factors: FloatArray = u @ v
+    return factors
 
 
 def apart(first: FloatArray, second: FloatArray) -> FloatArray:
