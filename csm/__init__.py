@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from csm.evaluation.results import Evaluation
     from csm.matching import Match, VertexMap, match_features
     from csm.matching import match_meshes as match_meshes
+    from csm.matching.collection import MatchedCollection, match_collection
     from csm.matching.match import match
     from csm.matching.network import load_model
     from csm.mesh import Mesh, PointMap, read_mesh, write_mesh
@@ -45,6 +46,7 @@ _PLACES = {
     "csm.evaluation.protocol": ("EvaluationProtocol",),
     "csm.evaluation.results": ("Evaluation",),
     "csm.matching": ("Match", "VertexMap", "match_features", "match_meshes"),
+    "csm.matching.collection": ("MatchedCollection", "match_collection"),
     "csm.matching.match": ("match",),
     "csm.matching.network": ("load_model",),
     "csm.mesh": ("Mesh", "PointMap", "read_mesh", "write_mesh"),
@@ -64,6 +66,7 @@ __all__ = [
     "Evaluation",
     "EvaluationProtocol",
     "Match",
+    "MatchedCollection",
     "Mesh",
     "Operators",
     "PointMap",
@@ -77,6 +80,7 @@ __all__ = [
     "load_humans",
     "load_model",
     "match",
+    "match_collection",
     "match_features",
     "preset",
     "read_mesh",

@@ -1,4 +1,4 @@
-"""``csm match a.off b.ply out=DIR``: match two meshes of your own."""
+"""``csm match a.off b.ply out=DIR``: match two meshes of your own, or all of a folder (folder=DIR)."""
 
 from __future__ import annotations
 
@@ -22,8 +22,12 @@ register("descriptor")
 
 def run(cfg: DictConfig) -> dict[str, Any]:
     """Match and write the map, the coloured meshes, a picture page and an account; return counts."""
+    if cfg.folder is not None:
+        from csm.commands.collection import run_collection
+
+        return run_collection(cfg, *_method(cfg))
     if None in (cfg.source, cfg.target):
-        raise ConfigError("match needs two meshes: csm match SOURCE TARGET [OUT]")
+        raise ConfigError("match needs two meshes: csm match SOURCE TARGET [OUT], or a folder of them: folder=DIR")
     begun = time.perf_counter()
     folder = Path(cfg.out or f"{Path(cfg.source).stem}_to_{Path(cfg.target).stem}")
     _require_place(folder, [Path(cfg.source), Path(cfg.target)], cfg.overwrite)

@@ -105,7 +105,7 @@ def require_own(outputs: Iterable[Path], account: Path, overwrite: bool) -> None
     outputs
         The files to be written.
     account
-        The json that an earlier run wrote with them: it has the hash of each under "files".
+        The json that an earlier run wrote with them: it has the hash of each under "files", by its path from there.
     overwrite
         Whether to let all of them be replaced.
 
@@ -118,8 +118,9 @@ def require_own(outputs: Iterable[Path], account: Path, overwrite: bool) -> None
         return
     files = _files_of(account)
     for path in outputs:
-        if os.path.lexists(path) and (not path.is_file() or files.get(path.name) != digest(path)):
-            why = "has been changed since csm wrote it" if path.name in files else "was not written by csm here"
+        name = path.relative_to(account.parent).as_posix()
+        if os.path.lexists(path) and (not path.is_file() or files.get(name) != digest(path)):
+            why = "has been changed since csm wrote it" if name in files else "was not written by csm here"
             raise ConfigError(f"{path}: there is such a file, which {why}; {_OVERWRITE}")
     if os.path.lexists(account) and not files:
         raise ConfigError(f"{account}: there is such a file, which was not written by csm here; {_OVERWRITE}")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from csm.matching.base import Described, Matcher
 from csm.matching.confidence import confidence_of
 from csm.matching.maps import VertexMap
-from csm.matching.refinement.base import Refined, start_of
+from csm.matching.refinement.base import Refined, RefinedMap, start_of
 from csm.matching.signals import Sides
 from csm.matching.way import Way
 
@@ -34,10 +34,30 @@ def match_both_ways(rule: Matcher, source: Described, target: Described) -> Both
     if not isinstance(rule, Refined):
         there, back = rule(source, target), rule(target, source)
         return _judged(Way(there), Way(back), None, None, source, target, "")
-    starts = start_of(rule.matcher, source, target), start_of(rule.matcher, target, source)
-    done = rule.refiner(starts[0], source, target)
-    backward = done.backward or rule.refiner(starts[1], target, source).forward
-    return _judged(done.forward, backward, *starts, source, target, done.text)
+    start = start_of(rule.matcher, source, target)
+    return both_ways_of(rule.refiner(start, source, target), rule, source, target, start)
+
+
+def both_ways_of(
+    done: RefinedMap, rule: Refined, source: Described, target: Described, start: VertexMap | None = None
+) -> BothWays:
+    """Return the ways of a refined map in both directions, with how far to believe each.
+
+    Parameters
+    ----------
+    done
+        The refined map.
+    rule
+        By what it was matched and refined; where `done` has no way back, that is made by it.
+    source, target
+        The shapes.
+    start
+        What was refined; by default what the matcher of `rule` says.
+    """
+    first = start or start_of(rule.matcher, source, target)
+    second = start_of(rule.matcher, target, source)
+    backward = done.backward or rule.refiner(second, target, source).forward
+    return _judged(done.forward, backward, first, second, source, target, done.text)
 
 
 def _judged(

@@ -10,7 +10,7 @@ from csm._types import Float32Array
 from csm.data.store import Store
 from csm.descriptors.base import Descriptor
 from csm.matching.base import Described, Matcher, require_device
-from csm.matching.both import match_both_ways
+from csm.matching.both import BothWays, match_both_ways
 from csm.matching.confidence import share_returning
 from csm.matching.maps import VertexMap
 from csm.matching.methods import Method, PrecomputedMethod, as_method
@@ -87,11 +87,22 @@ def match(
     here, there = (chosen.describe(subject.cleaned.mesh, store, device) for subject in subjects)
     made = rule if improver is None else Refined(rule, improver)
     found = match_both_ways(made, here, there)
-    forward, backward = on_given(found.forward, *subjects), on_given(found.backward, *subjects[::-1])
-    given = subjects[0].given, subjects[1].given
-    features = _on_given_rows(here, subjects[0]), _on_given_rows(there, subjects[1])
-    notes = (*_notes(*subjects), *_against_input(here, there))
-    return Match(*given, forward, backward, chosen, made, notes, found.text, features)
+    return match_of(found, (subjects[0], subjects[1]), (here, there), chosen, made)
+
+
+def match_of(
+    found: BothWays,
+    subjects: tuple[Subject, Subject],
+    described: tuple[Described, Described],
+    method: Method,
+    matcher: Matcher,
+) -> Match:
+    """Return the match of the ways between two cleaned meshes, on the vertices as they were given."""
+    source, target = subjects
+    forward, backward = on_given(found.forward, source, target), on_given(found.backward, target, source)
+    features = _on_given_rows(described[0], source), _on_given_rows(described[1], target)
+    notes = (*_notes(source, target), *_against_input(*described))
+    return Match(source.given, target.given, forward, backward, method, matcher, notes, found.text, features)
 
 
 _CLEARLY = 0.1  # more of the vertices return

@@ -34,6 +34,27 @@ _FINAL = (30, 40, 60, 100)  # sizes of the functional maps before the choice
 _APART = 0.5  # |C - C'| / sqrt(K) from which two functional maps are different maps
 
 
+@dataclass(frozen=True, eq=False)
+class Solutions:
+    """The different maps that a search ends at.
+
+    Parameters
+    ----------
+    matrices
+        Shape (c, K, K): their functional maps.
+    scores
+        What is known of each without ground truth.
+    """
+
+    matrices: Tensor
+    scores: Scores
+
+    @property
+    def best(self) -> int:
+        """Number of the one to take."""
+        return int(self.scores.total.argmin())
+
+
 @dataclass(frozen=True)
 class Multistart(Refiner):
     """Refine many starts at samples, choose the best, and refine it at all vertices.
@@ -81,6 +102,11 @@ class Multistart(Refiner):
             raise ConfigError(f"{self}: wanted weights of at least 0")
 
     @property
+    def first(self) -> int:
+        """Size of the functional maps that a search starts with."""
+        return _SEARCH[0]
+
+    @property
     def climb(self) -> Climb:
         """How the chosen start becomes finer."""
         return Climb(self.schedule, self.weight)
@@ -93,25 +119,28 @@ class Multistart(Refiner):
 
     def search(self, start: VertexMap, pair: Pair) -> tuple[Tensor, str]:
         """Return the functional map of the best start, (K, K) for the first K of the schedule, and what was done."""
-        sampled = pair.sampled(self.samples)
-        largest = min(pair.k, len(sampled.source), len(sampled.target))
-        sizes = [size for size in _SEARCH if size <= largest] or [largest]
-        matrices = self.starts(first_matrix(start.indices, pair, sizes[0]))
-        maps = self._refine(matrices, sampled, sizes)
-        order = scores(maps, sampled, sizes[-1]).total.argsort()
-        different = _different(matrices_of(maps[order], sampled, sizes[-1]), self.finalists)
-        found, judged = self._finals(different, pair)
-        best = int(judged.total.argmin())
+        starts = self.starts(first_matrix(start.indices, pair, min(pair.k, self.first)))
+        found = self.solutions(starts, pair)
+        best, judged = found.best, found.scores
         text = (
-            f"the best of {len(matrices)} starts and {len(found)} different maps of them (stretch "
+            f"the best of {len(starts)} starts and {len(found.matrices)} different maps of them (stretch "
             f"{float(judged.stretch[best]):.2f}, commutation {float(judged.commutation[best]):.2f}, descriptor "
             f"{float(judged.descriptor[best]):.2f}), refined jointly with the descriptor to functional maps of "
             f"{self.climb.sizes(pair.k)[-1]} functions"
         )
-        return found[best], text
+        return found.matrices[best], text
 
-    def _finals(self, matrices: Tensor, pair: Pair) -> tuple[list[Tensor], Scores]:
-        """Refine maps at more samples; return their functional maps, of the first size of the climb, and scores."""
+    def solutions(self, starts: Tensor, pair: Pair) -> Solutions:
+        """Refine functional maps to begin with, (B, K, K), and return the best that differ, see `finals`."""
+        sampled = pair.sampled(self.samples)
+        largest = min(pair.k, len(sampled.source), len(sampled.target))
+        sizes = [size for size in _SEARCH if size <= largest] or [largest]
+        maps = self._refine(starts, sampled, sizes)
+        order = scores(maps, sampled, sizes[-1]).total.argsort()
+        return self.finals(_different(matrices_of(maps[order], sampled, sizes[-1]), self.finalists), pair)
+
+    def finals(self, matrices: Tensor, pair: Pair) -> Solutions:
+        """Refine functional maps (c, K, K) at more samples; return them, of the first size of the climb, and scores."""
         climb = Climb(_FINAL, self.weight, samples=_FINAL_SAMPLES, candidates=_FINAL_SAMPLES)
         sampled, k = pair.sampled(_FINAL_SAMPLES), climb.sizes(pair.k)[-1]
         maps = []
@@ -120,7 +149,7 @@ class Multistart(Refiner):
             maps.append(nearest_rows(queries[sampled.source.at], candidates[sampled.target.at]))
         together = torch.stack(maps)
         first = min(self.climb.sizes(pair.k)[0], k)
-        return list(matrices_of(together, sampled, first)), scores(together, sampled, k)
+        return Solutions(matrices_of(together, sampled, first), scores(together, sampled, k))
 
     def starts(self, matrix: Tensor) -> Tensor:
         """Return the functional maps (B, K, K) to begin with, made of that of a start, (K, K)."""

@@ -56,7 +56,9 @@ def test_icp_is_what_plain_numpy_makes(store):
     made = ICP(12, 3)(found.start, found.source, found.target)
     assert (made.forward.vertex_map.indices == indices).mean() > 0.99
     np.testing.assert_allclose(made.forward.functional_map.matrix, matrix, atol=0.02)
-    np.testing.assert_allclose(made.forward.functional_map.matrix @ made.forward.functional_map.matrix.T, np.eye(12), atol=1e-5)
+    np.testing.assert_allclose(
+        made.forward.functional_map.matrix @ made.forward.functional_map.matrix.T, np.eye(12), atol=1e-5
+    )
 
 
 def test_bijective_zoomout_solves_for_both_maps_together(store):

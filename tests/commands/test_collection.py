@@ -1,0 +1,91 @@
+from __future__ import annotations
+
+import json
+import os
+import sys
+
+import pytest
+from hydra.core.global_hydra import GlobalHydra
+
+from csm.commands.main import main
+from csm.mesh.io import write_mesh
+from tests.matching.collection.copies import copies
+from tests.shapes import blob
+
+SMALL = ("descriptor=wks", "descriptor.k=30", "workers=0")
+
+
+@pytest.fixture
+def csm(tmp_path, monkeypatch, capfd):
+    """Return a function that runs ``csm WORDS`` in an empty folder and gives status, output and error output."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("CSM_CACHE", str(tmp_path / ".store"))
+
+    def call(*words: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["csm", *words])
+        GlobalHydra.instance().clear()
+        status = 0
+        try:
+            main()
+        except SystemExit as ended:
+            status = int(ended.code or 0)
+        return (status, *capfd.readouterr())
+
+    return call
+
+
+def test_a_folder_is_matched_and_matched_again(csm, tmp_path):
+    (tmp_path / "in").mkdir()
+    for mesh in copies(3):
+        write_mesh(tmp_path / "in" / f"{mesh.name}.off", mesh)
+    status, out, _ = csm("match", "folder=in", "out=r", "pairs=reference", *SMALL)
+    assert status == 0
+    account = json.loads((tmp_path / "r/collection.json").read_text())
+    assert "3 shapes matched by the descriptor WKS" in out
+    assert "r: 4 maps in maps/" in out
+    assert len(os.listdir(tmp_path / "r/maps")) == 4
+    assert account["seconds"] > 0
+    assert {shape["file"] for shape in account["shapes"]} == {f"in/s{i}.off" for i in range(3)}
+    assert csm("match", "folder=in", "out=r", "pairs=all", *SMALL)[0] == 0
+    assert len(os.listdir(tmp_path / "r/maps")) == 6
+    (tmp_path / "r/maps/s0_to_s1.txt").write_text("mine")
+    status, _, error = csm("match", "folder=in", "out=r", *SMALL)
+    assert status == 2
+    assert "r/maps/s0_to_s1.txt: there is such a file, which has been changed since csm wrote it" in error
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["folder=in", "source=a.off"], "folder=in together with source=a.off: wanted either two meshes"),
+        (["a.off", "a.off", "folder=in"], "folder=in together with source=a.off target=a.off"),
+        (["folder=gone"], "gone: there is no such folder; wanted one with two or more meshes"),
+        (["folder=in"], "in: has 1 mesh files, wanted two or more"),
+        (["folder=in", "pairs=some"], "pairs=some: wanted auto, all or reference"),
+    ],
+)
+def test_what_cannot_be_is_said_before_any_work(csm, tmp_path, words, said):
+    (tmp_path / "in").mkdir()
+    write_mesh(tmp_path / "in/a.off", blob(2))
+    write_mesh(tmp_path / "a.off", blob(2))
+    status, _, error = csm("match", *words)
+    assert status == 2
+    assert said in error
+    assert not (tmp_path / "in_matched").exists()
+
+
+def test_the_inputs_are_never_replaced(csm, tmp_path):
+    (tmp_path / "out/shapes").mkdir(parents=True)
+    for name in ("a", "b"):
+        write_mesh(tmp_path / "out/shapes" / f"{name}.ply", blob(2))
+    before = {path: path.read_bytes() for path in (tmp_path / "out/shapes").iterdir()}
+    status, _, error = csm("match", "folder=out/shapes", "out=out", "overwrite=true")
+    assert status == 2
+    assert "which would be replaced" in error
+    assert {path: path.read_bytes() for path in (tmp_path / "out/shapes").iterdir()} == before
+
+
+def test_the_help_tells_of_folders(csm):
+    _, out, _ = csm("match", "--help")
+    assert "folder=null" in out
+    assert "pairs=auto" in out
