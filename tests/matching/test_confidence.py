@@ -69,5 +69,4 @@ def test_descriptors_that_know_their_place_return():
     here = torch.tensor(ball.vertices)
     tried = np.arange(0, ball.n_vertices, 3)
     assert share_returning(ball, tried, here, here) == 1.0
-    noise = torch.randn(here.shape, generator=torch.Generator().manual_seed(0), dtype=here.dtype)
-    assert share_returning(ball, tried, here, noise) < 0.5
+    assert share_returning(ball, tried, here, here[:1].repeat(50, 1)) < 0.1

@@ -28,7 +28,7 @@ def context(tmp_path_factory) -> Context:
 
 @pytest.fixture(scope="module")
 def findings(context) -> Findings:
-    return run(context, descriptors=("acd_paper",), refine=("none", "joint"), points=None)
+    return run(context, descriptors=("acd_paper",), refine=("none", "joint"), exact_points=None)
 
 
 def test_there_is_a_row_for_each_way_to_match(findings):
@@ -45,7 +45,7 @@ def test_there_is_a_row_for_each_way_to_match(findings):
 
 def test_errors_are_those_of_the_engine(context, findings):
     shapes = find_set(context.root, "TOSCA_5k_remeshed")
-    protocol = EvaluationProtocol([("cat0", "cat1"), ("cat1", "cat2")], drawn="pair")
+    protocol = EvaluationProtocol([("cat0", "cat1"), ("cat1", "cat2")])
     (wanted,) = evaluate("acd_paper", shapes, protocol, refine="joint", store=context.store, workers=1, progress=False)
     assert findings.rows[1]["TOSCA summary"]["age"] == pytest.approx(wanted.summary["age"], rel=1e-5)
 

@@ -13,6 +13,7 @@ from csm.matching.base import Described
 from csm.matching.embedded import Embedded, Samples
 
 _FOR_AXES = 1000  # samples of each shape that the principal axes of the features are computed from
+_ROUNDING = 1e-5  # spread of features, as a part of their size, that is none
 _WIDTH = 64  # features that are kept
 
 
@@ -58,7 +59,8 @@ class Pair:
         scaled = torch.cat([w.sqrt()[:, None] * (row - centre) for w, row in zip(weights, rows, strict=True)])
         _, lengths, axes = torch.linalg.svd(scaled, full_matrices=False)
         total = lengths.square().sum().sqrt()
-        axes = axes[:_WIDTH].T / torch.where(total > 0, total, torch.ones_like(total))
+        known = total > _ROUNDING * centre.norm()
+        axes = axes[:_WIDTH].T * torch.where(known, 1 / total, torch.zeros_like(total))
         return cls(source.embedded, target.embedded, (here - centre) @ axes, (there - centre) @ axes)
 
     @cached_property

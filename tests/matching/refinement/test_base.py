@@ -11,6 +11,7 @@ from csm.matching.base import Described
 from csm.matching.maps import VertexMap
 from csm.matching.nearest import Nearest
 from csm.matching.refinement import Refined, RefinedMap, Refiner
+from csm.matching.way import Way
 from tests.matching.pairs import as_map, described
 from tests.shapes import blob
 
@@ -25,7 +26,7 @@ class Backwards(Refiner):
 
     def __call__(self, start: VertexMap, source: Described, target: Described) -> RefinedMap:
         n = target.mesh.n_vertices
-        return RefinedMap(as_map((n - 1 - start.indices + self.step) % n, source, target))
+        return RefinedMap(Way(as_map((n - 1 - start.indices + self.step) % n, source, target)))
 
 
 def test_the_refiner_is_given_the_map_of_the_matcher_and_both_shapes(store):

@@ -49,7 +49,7 @@ def test_it_mends_a_start_and_keeps_what_the_descriptor_knows(store):
     off = np.linalg.norm(mesh.vertices[made.forward.vertex_map.indices] - mesh.vertices[found.truth], axis=1)
     begun = np.linalg.norm(mesh.vertices[found.start.indices] - mesh.vertices[found.truth], axis=1)
     assert off.mean() < 0.2 * begun.mean()
-    back = made.forward.compose(made.backward).indices
+    back = made.forward.vertex_map.compose(made.backward.vertex_map).indices
     assert (back == np.arange(len(back))).mean() > 0.5
 
 

@@ -107,7 +107,7 @@ def test_meshes_of_different_size_and_a_single_feature_are_mapped(store):
     made = Multistart()(Nearest()(source, target), source, target)
     assert made.forward.vertex_map.indices.shape == (162,)
     assert made.backward.vertex_map.indices.shape == (42,)
-    assert made.forward.n_target == 42
+    assert made.forward.vertex_map.n_target == 42
 
 
 @pytest.mark.parametrize(
