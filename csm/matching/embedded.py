@@ -165,5 +165,6 @@ def farthest_points(points: FloatArray, n: int) -> IntArray:
         chosen[i] = at
         rest = points - points[at]
         np.minimum(distance, np.einsum("ij,ij->i", rest, rest), out=distance)
+        distance[at] = -1.0  # chosen once, also where others lie at the same place
         at = int(distance.argmax())
     return chosen

@@ -84,7 +84,7 @@ class Refinement(Study):
         exact = (
             "exact geodesic distances"
             if self.exact_points is None
-            else f"exact geodesic distances at {self.exact_points} points of each target and scaled edge paths at others"
+            else f"exact geodesic distances at {self.exact_points} points of a target and scaled edge paths at others"
         )
         notes = [
             f"Mean error over {points} template points, {exact}, in thousandths of the diameter. Good: pairs with a "

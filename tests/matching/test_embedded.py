@@ -28,10 +28,9 @@ def embedded() -> Embedded:
 def test_each_point_is_the_farthest_from_those_before_it(seed, n_points, n):
     points = np.random.default_rng(seed).normal(size=(n_points, 3))
     chosen = farthest_points(points, n)
-    if n >= n_points:
-        np.testing.assert_array_equal(chosen, np.arange(n_points))
-        return
-    assert len(set(chosen.tolist())) == n
+    n = min(n, n_points)
+    assert len(set(chosen.tolist())) == len(chosen) == n
+    np.testing.assert_array_equal(farthest_points(points, max(1, n - 1)), chosen[: max(1, n - 1)])
     assert chosen[0] == np.linalg.norm(points - points.mean(0), axis=1).argmax()
     distances = cdist(points, points)
     for i in range(1, n):
@@ -58,8 +57,14 @@ def test_samples_share_out_the_area_and_hold_rows_of_the_whole(embedded):
 
 
 def test_no_more_samples_than_vertices(embedded):
-    np.testing.assert_array_equal(embedded.samples(10**6).at, np.arange(embedded.mesh.n_vertices))
-    np.testing.assert_allclose(embedded.samples(10**6).areas, embedded.areas, rtol=1e-6)
+    samples = embedded.samples(10**6)
+    np.testing.assert_array_equal(np.sort(samples.at), np.arange(embedded.mesh.n_vertices))
+    np.testing.assert_allclose(samples.areas, embedded.areas[samples.at], rtol=1e-6)
+
+
+def test_coincident_points_are_each_chosen_once():
+    points = np.repeat(np.random.default_rng(0).normal(size=(5, 3)), 3, axis=0)
+    assert sorted(farthest_points(points, 15).tolist()) == list(range(15))
 
 
 def test_a_vertex_without_area_is_no_sample():
