@@ -20,10 +20,15 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
 
 
 @pytest.fixture(scope="session")
-def small_humans(store: Store) -> list[Shape]:
-    """One person in two poses, in other triangulations of 700 vertices, with the flip of both sides."""
-    humans = HumansSet("remeshed", 700, str(store.root))
-    return [humans.load(name) for name in ("s00_p00", "s00_p03")]
+def small_human(store: Store) -> Shape:
+    """A built-in human in a triangulation of 700 vertices, with the flip of both sides."""
+    return HumansSet("remeshed", 700, str(store.root)).load("s00_p00")
+
+
+@pytest.fixture(scope="session")
+def small_humans(store: Store, small_human: Shape) -> list[Shape]:
+    """The same person in two poses."""
+    return [small_human, HumansSet("remeshed", 700, str(store.root)).load("s00_p03")]
 
 
 @pytest.fixture(scope="session")

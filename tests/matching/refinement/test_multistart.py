@@ -73,10 +73,9 @@ def test_of_several_finalists_the_best_judged_is_taken(store):
     assert best <= alone + 0.02  # the text rounds
 
 
-def test_a_body_is_mapped_to_its_mirror_image_through_its_own_symmetry(store, small_humans):
+def test_a_body_is_mapped_to_its_mirror_image_through_its_own_symmetry(store, small_human):
     """Maps keep orientation, so the left hand goes to the left hand as the image has it: the image of the right one."""
-    body = small_humans[0]
-    at, flip = body.truth.indices, body.mirror.indices
+    body, at, flip = small_human, small_human.truth.indices, small_human.mirror.indices
     source, target = described(body.mesh, store), described(mirrored(body.mesh), store)
     found = Multistart()(Nearest()(source, target), source, target).forward.vertex_map.indices
     surface = geodesics(target.mesh, "edge")
