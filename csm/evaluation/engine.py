@@ -60,11 +60,8 @@ def evaluate(
         A set over one template, such as those of `csm.find_set`, or shapes in memory.
     protocol
         Pairs, points, distance and normaliser; by default all, exact, as fractions of the diameter.
-    matching
-        One or several matchers or their names.
-    refine
-        One or several refiners or their names (`csm.matching.refinement`), "none" for the matcher alone; each matcher
-        is followed by each of them.
+    matching, refine
+        One or several matchers, and refiners (`csm.matching.refinement`) that each is followed by; "none" for it alone.
     names
         Of the shapes to evaluate; by default all of the set whose correspondence is known.  Of a set with several
         templates, such as TOSCA with its classes, only shapes of one template make a pair.
@@ -74,10 +71,9 @@ def evaluate(
         Of what is prepared and of distances (by default csm's in the user's cache folder); of finished targets.
     workers, device
         Processes of one thread, see `csm._parallel.n_processes`; where networks run and features are compared.
-    skip_failures
-        Leave out what cannot be used, with the reason in `Evaluation.failures`, instead of raising.
-    keep_pairs, progress
-        Return the errors point by point in `Evaluation.pairs`; show progress bars.
+    skip_failures, keep_pairs, progress
+        Leave out what cannot be used, with the reason in `Evaluation.failures`, instead of raising; return the errors
+        point by point in `Evaluation.pairs`; show progress bars.
 
     Returns
     -------
@@ -87,7 +83,7 @@ def evaluate(
     Raises
     ------
     DataError
-        If there is no pair, shapes have no template point in common, or nothing could be measured.
+        If there is no pair, no common template point, or nothing could be measured.
     ConfigError
         If a method, matcher, refiner or device is unknown, or two have one name.
     """

@@ -15,9 +15,8 @@ from csm.matching.confidence import share_returning
 from csm.matching.maps import VertexMap
 from csm.matching.methods import Method, PrecomputedMethod, as_method
 from csm.matching.nearest import Rows, nearest
-from csm.matching.refinement.base import Refined, Refiner
-from csm.matching.refinement.registry import refiner as as_refiner
-from csm.matching.registry import matcher as as_matcher
+from csm.matching.refinement.base import Refiner
+from csm.matching.registry import matchers as as_matchers
 from csm.matching.result import Match
 from csm.matching.signals import SAMPLES
 from csm.matching.subjects import Cleaning, Subject, on_given, subject_of
@@ -46,11 +45,9 @@ def match(
     method
         A descriptor, the name of a preset (the default is csm's own setting of ACD), or a trained network of
         `csm.load_model`.
-    matcher
-        A matcher or its name: "nearest", or for networks "argmax".
-    refine
-        A refiner or its name: "multistart", "joint", "zoomout", "bijective" or "icp" (`csm.matching.refinement`);
-        "none" ends at the matcher.
+    matcher, refine
+        A matcher or its name, "nearest" or for networks "argmax", and a refiner or its name: "multistart", "joint",
+        "zoomout", "bijective", "icp" (`csm.matching.refinement`), or "none", which ends at the matcher.
     clean
         "auto" mends copies of the meshes first (`csm.clean`) where they need it; "off" takes them as they are.  The
         result is on the given vertices in either case.
@@ -75,19 +72,18 @@ def match(
     --------
     >>> import csm
     >>> humans = csm.load_humans()
-    >>> csm.match(humans.mesh("s00_p00"), humans.mesh("s00_p02"), "hks")  # doctest: +SKIP
-    Match(s00_p00 -> s00_p02 by hks, nearest)
+    >>> csm.match(humans.mesh("s00_p00"), humans.mesh("s00_p02"))  # doctest: +SKIP
+    Match(s00_p00 -> s00_p02 by acd, nearest+multistart)
     """
-    chosen, rule, improver = as_method(method), as_matcher(matcher), as_refiner(refine)
+    chosen, (rule,) = as_method(method), as_matchers([matcher], [refine])
     store = store if isinstance(store, Store) else Store(store)
     if isinstance(chosen, PrecomputedMethod):
         clean = "off"  # its features are those of the given vertices
     subjects = [subject_of(mesh, clean, name) for mesh, name in ((source, "source"), (target, "target"))]
     require_device(device)
     here, there = (chosen.describe(subject.cleaned.mesh, store, device) for subject in subjects)
-    made = rule if improver is None else Refined(rule, improver)
-    found = match_both_ways(made, here, there)
-    return match_of(found, (subjects[0], subjects[1]), (here, there), chosen, made)
+    found = match_both_ways(rule, here, there)
+    return match_of(found, (subjects[0], subjects[1]), (here, there), chosen, rule)
 
 
 def match_of(
