@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from csm._types import Float32Array
 from csm.data.store import Store
@@ -13,15 +15,16 @@ from csm.matching.base import Described, Matcher, require_device
 from csm.matching.both import BothWays, match_both_ways
 from csm.matching.confidence import share_returning
 from csm.matching.maps import VertexMap
-from csm.matching.methods import Method, PrecomputedMethod, as_method
+from csm.matching.methods import DescriptorMethod, Method, PrecomputedMethod, as_method
 from csm.matching.nearest import Rows, nearest
-from csm.matching.refinement.base import Refiner
+from csm.matching.refinement.base import Refined, Refiner
 from csm.matching.registry import matchers as as_matchers
 from csm.matching.result import Match
 from csm.matching.signals import SAMPLES
 from csm.matching.subjects import Cleaning, Subject, on_given, subject_of
 from csm.mesh.debris import body_of
 from csm.mesh.inputs import MeshLike
+from csm.mesh.shape import Mesh
 from csm.mesh.topology import rim
 
 
@@ -81,9 +84,26 @@ def match(
         clean = "off"  # its features are those of the given vertices
     subjects = [subject_of(mesh, clean, name) for mesh, name in ((source, "source"), (target, "target"))]
     require_device(device)
-    here, there = (chosen.describe(subject.cleaned.mesh, store, device) for subject in subjects)
+    here, there = _described(chosen, rule, [subject.cleaned.mesh for subject in subjects], store, device)
     found = match_both_ways(rule, here, there)
     return match_of(found, (subjects[0], subjects[1]), (here, there), chosen, rule)
+
+
+def _described(method: Method, rule: Matcher, meshes: list[Mesh], store: Store, device: str) -> list[Described]:
+    """Describe both meshes, and compute the eigenfunctions that a refinement needs, on two threads where that helps."""
+
+    def describe(mesh: Mesh) -> Described:
+        found = method.describe(mesh, store, device)
+        if isinstance(rule, Refined):
+            _ = found.embedded
+        return found
+
+    if not isinstance(method, DescriptorMethod) or meshes[0].digest == meshes[1].digest:
+        return [describe(mesh) for mesh in meshes]
+    # The eigensolver leaves the interpreter's lock free for most of its time.  It sets one BLAS thread and then back
+    # what it found: the outer limit keeps two solvers from leaving each other's setting behind.
+    with threadpool_limits(1), ThreadPoolExecutor(2) as threads:
+        return list(threads.map(describe, meshes))
 
 
 def match_of(
