@@ -26,6 +26,11 @@ def run_collection(cfg: DictConfig, method: Method, text: str) -> dict[str, Any]
             f"folder={cfg.folder} together with {given}: wanted either two meshes (csm match SOURCE TARGET) or a "
             "folder of them (csm match folder=DIR out=OUT)"
         )
+    if (cfg.matching, cfg.refine) != ("nearest", "multistart"):
+        raise ConfigError(
+            f"folder={cfg.folder} with matching={cfg.matching} refine={cfg.refine}: a folder is matched by nearest and "
+            "multistart only; leave these options out"
+        )
     require_pairs(cfg.pairs)
     files = mesh_files(cfg.folder)
     out = Path(cfg.out or f"{Path(cfg.folder).expanduser().resolve().name}_matched")

@@ -10,9 +10,10 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig
 
 from csm.commands.app import command
-from csm.commands.groups import register
+from csm.commands.groups import plain, register
 from csm.commands.outputs import require_new_in_sweep, require_not_input, require_own, require_place
 from csm.data.store import Store
+from csm.descriptors.presets import PRESETS
 from csm.errors import ConfigError
 from csm.matching import DescriptorMethod, Method, match_meshes
 from csm.viewer.match_folder import ACCOUNT, FILES, made_by, write_match
@@ -28,6 +29,9 @@ def run(cfg: DictConfig) -> dict[str, Any]:
         return run_collection(cfg, *_method(cfg))
     if None in (cfg.source, cfg.target):
         raise ConfigError("match needs two meshes: csm match SOURCE TARGET [OUT], or a folder of them: folder=DIR")
+    for key in ("matching", "refine"):
+        if not isinstance(cfg[key], str):
+            raise ConfigError(f"{key}={plain(cfg[key])}: a match takes one of them; csm evaluate takes a list")
     begun = time.perf_counter()
     folder = Path(cfg.out or f"{Path(cfg.source).stem}_to_{Path(cfg.target).stem}")
     _require_place(folder, [Path(cfg.source), Path(cfg.target)], cfg.overwrite)
@@ -68,7 +72,8 @@ def _method(cfg: DictConfig) -> tuple[Method, str]:
     """Return the method, and what to call it."""
     if cfg.checkpoint is None:
         descriptor = instantiate(cfg.descriptor)
-        return DescriptorMethod(descriptor), f"the descriptor {descriptor}"
+        known = next((name for name, setting in PRESETS.items() if setting == descriptor), None)
+        return DescriptorMethod(descriptor), f"the descriptor {known or descriptor}"
     from csm.matching.network import load_model
 
     network = load_model(cfg.checkpoint)

@@ -8,10 +8,10 @@ import numpy as np
 from torch import Tensor
 
 from csm._types import FloatArray, IntArray
-from csm.matching.calibration import calibration
+from csm.matching.calibration import Calibration, calibration
 from csm.matching.maps import VertexMap
 from csm.matching.nearest import nearest
-from csm.matching.signals import NEAR, Sides, map_signals, spectral_signals
+from csm.matching.signals import NEAR, OF_MAPS, Sides, map_signals, spectral_signals
 from csm.mesh.debris import body_of
 from csm.mesh.shape import Mesh
 
@@ -52,9 +52,8 @@ class Confidence:
     def verdict(self) -> str:
         """One sentence for people on how far to believe the map."""
         if self.trusted >= 0.9:
-            return (
-                f"{100 * self.trusted:.0f} % of the source has a trustworthy partner: most of the map can be believed"
-            )
+            share = "all" if self.trusted == 1 else f"{np.floor(100 * self.trusted):.0f} %"
+            return f"{share} of the source has a trustworthy partner (a confidence of {TRUSTED:g} or more)"
         share = _in_words(1 - self.trusted)
         if self.trusted >= 0.6:
             return (
@@ -105,8 +104,27 @@ def confidence_of(sides: Sides, start: VertexMap | None = None) -> Confidence:
     if start is None:
         values = calibration("map").probability(signals)
     else:
-        values = calibration("refined").probability(np.hstack([signals, spectral_signals(sides, start)]))
+        signals = np.hstack([signals, spectral_signals(sides, start)])
+        values = refined_probability(calibration("refined"), signals)
     return Confidence(np.where(sides.forward.indices >= 0, values, 0.0), distance)
+
+
+def refined_probability(found: Calibration, signals: FloatArray) -> FloatArray:
+    """Return the probability by a calibration of refined maps, or less where a vertex does not return to its place.
+
+    A refined map and the one back are two sides of one functional map: what does not return shares its partner with
+    another part of the source, such as the other arm of a target that lacks one.  Pairs to fit on have too little of
+    that, so the probability is at most exp(-(distance / NEAR)^2).
+
+    Parameters
+    ----------
+    found
+        The calibration.
+    signals
+        Shape (N, S): `OF_MAPS` and `OF_REFINED`.
+    """
+    back = signals[:, OF_MAPS.index("back")]
+    return np.minimum(found.probability(signals), np.exp(-((back / NEAR) ** 2)))
 
 
 def there_and_back(forward: VertexMap, backward: VertexMap, source: Mesh) -> FloatArray:

@@ -26,6 +26,7 @@ from csm.data.store import Store
 from csm.errors import ConfigError
 from csm.matching.base import Described
 from csm.matching.calibration import Calibration, calibration, fit_calibration
+from csm.matching.confidence import refined_probability
 from csm.matching.maps import VertexMap
 from csm.matching.methods import as_method
 from csm.matching.refinement.registry import refiner
@@ -240,7 +241,9 @@ def _record(known: dict[str, Calibration], study: ConfidenceStudy, count: int) -
 
 
 def _probability(known: dict[str, Calibration], seen: Seen) -> FloatArray:
-    return known["map" if seen.refine == NEAREST else "refined"].probability(seen.signals)
+    if seen.refine == NEAREST:
+        return known["map"].probability(seen.signals)
+    return refined_probability(known["refined"], seen.signals)
 
 
 def _groups(seen: Sequence[Seen]) -> dict[tuple[str, str], list[Seen]]:

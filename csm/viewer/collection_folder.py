@@ -177,9 +177,25 @@ def _page(collection: MatchedCollection, viewer: Viewer) -> str:
 
 def verdict(collection: MatchedCollection) -> str:
     """Return a sentence on how well the maps of the pairs agreed before they were made to agree."""
-    edges, away = collection.edges, np.array([edge.apart for edge in collection.edges])
+    edges = collection.edges
     said = f"{len(edges) - len(collection.mended)} of {len(edges)} maps of single pairs agree with all others"
     mended = f"; the other {len(collection.mended)} were replaced by what the others say" if collection.mended else ""
+    return f"{_agreement(collection, said, mended)}{_untrusted(collection)}"
+
+
+def _untrusted(collection: MatchedCollection) -> str:
+    """Name the shapes of which less than 60 % have a trustworthy partner on the reference."""
+    few = [f"{name} ({100 * share:.0f} %)" for name, share in collection.trusted.items() if share < 0.6]
+    if not few:
+        return ""
+    return (
+        f".  WARNING: shares of these shapes that have a trustworthy partner on {collection.reference}: "
+        f"{', '.join(few)}; they may be of another kind, or parts"
+    )
+
+
+def _agreement(collection: MatchedCollection, said: str, mended: str) -> str:
+    edges, away = collection.edges, np.array([edge.apart for edge in collection.edges])
     doubt = [n for n in collection.names if np.mean([e.mended for e in edges if n in (e.source, e.target)]) >= 0.5]
     if float(np.mean(away)) > 0.5:
         return f"WARNING: only {said}{mended}: these shapes may be of different kinds"
@@ -199,6 +215,7 @@ def _account(collection: MatchedCollection, n_maps: int) -> dict[str, Any]:
         "method": f"{collection.text}; descriptor {described}",
         "search": collection.refiner.parameters(),
         "verdict": verdict(collection),
+        "trusted": dict(collection.trusted),
         "cycles": {
             "alone": _mean(collection.cycles.alone),
             "together": _mean(collection.cycles.together),

@@ -6,8 +6,16 @@ import torch
 
 from csm.matching import VertexMap
 from csm.matching.base import Described
-from csm.matching.confidence import TRUSTED, Confidence, confidence_of, share_returning, there_and_back
-from csm.matching.signals import NEAR, Sides
+from csm.matching.calibration import Calibration
+from csm.matching.confidence import (
+    TRUSTED,
+    Confidence,
+    confidence_of,
+    refined_probability,
+    share_returning,
+    there_and_back,
+)
+from csm.matching.signals import NEAR, OF_MAPS, OF_REFINED, Sides
 from tests.shapes import blob, sphere
 
 
@@ -29,7 +37,7 @@ def test_distances_are_in_units_of_the_root_of_the_area_and_inf_without_a_match(
 @pytest.mark.parametrize(
     ("share", "said"),
     [
-        (0.95, "95 % of the source has a trustworthy partner"),
+        (0.95, "95 % of the source has a trustworthy partner (a confidence of 0.5 or more)"),
         (0.7, "about a third of the source has no trustworthy partner: limbs may"),
         (0.3, "WARNING: about two thirds of the source has no"),
         (0.0, "WARNING: almost all of the source has no"),
@@ -70,3 +78,19 @@ def test_descriptors_that_know_their_place_return():
     tried = np.arange(0, ball.n_vertices, 3)
     assert share_returning(ball, tried, here, here) == 1.0
     assert share_returning(ball, tried, here, here[:1].repeat(50, 1)) < 0.1
+
+
+def test_what_does_not_return_is_not_believed_whatever_else_speaks_for_it():
+    names = (*OF_MAPS, *OF_REFINED)
+    sure = Calibration(names, (0.0,) * 12, (1.0,) * 12, (0.0,) * 12, 9.0)
+    signals = np.zeros((3, 12))
+    signals[:, OF_MAPS.index("back")] = [0.0, 0.5 * NEAR, 3 * NEAR]
+    found = refined_probability(sure, signals)
+    assert found[0] > 0.99
+    assert 0.7 < found[1] < 0.8
+    assert found[2] < 0.001
+
+
+def test_all_is_said_of_all_only():
+    assert Confidence(np.ones(1000), np.zeros(1000)).verdict.startswith("all of the source")
+    assert Confidence(np.r_[np.ones(999), 0.0], np.zeros(1000)).verdict.startswith("99 % of the source")

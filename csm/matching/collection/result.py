@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import permutations
 from pathlib import Path
 from typing import TypeAlias
@@ -128,6 +129,12 @@ class MatchedCollection:
             f"of these maps did not agree with the others and were replaced; functional maps of {k} functions that "
             f"close every cycle, refined jointly with the descriptor to {self.refiner.schedule[-1]}"
         )
+
+    @cached_property
+    def trusted(self) -> dict[str, float]:
+        """Name -> share of each shape that has a trustworthy partner on the reference, see `Confidence.trusted`."""
+        names = [name for name in self.names if name != self.reference]
+        return {name: self.match(name, self.reference).confidence.trusted for name in names}
 
     def number(self, which: Which) -> int:
         """Return the number of a shape; ConfigError if there is none of that number or name."""

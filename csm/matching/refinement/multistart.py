@@ -123,7 +123,7 @@ class Multistart(Refiner):
         found = self.solutions(starts, pair)
         best, judged = found.best, found.scores
         text = (
-            f"the best of {len(starts)} starts and {len(found.matrices)} different maps of them (stretch "
+            f"the best of {len(starts)} starts and {_counted(len(found.matrices))} of them (stretch "
             f"{float(judged.stretch[best]):.2f}, commutation {float(judged.commutation[best]):.2f}, descriptor "
             f"{float(judged.descriptor[best]):.2f}), refined jointly with the descriptor to functional maps of "
             f"{self.climb.sizes(pair.k)[-1]} functions"
@@ -170,6 +170,10 @@ class Multistart(Refiner):
         for size in sizes[n_guided:]:
             maps = step(matrices_of(maps, sampled, size), sampled, free)
         return maps
+
+
+def _counted(n: int) -> str:
+    return "one map" if n == 1 else f"{n} different maps"
 
 
 def _different(matrices: Tensor, most: int) -> Tensor:
