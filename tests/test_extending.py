@@ -73,7 +73,7 @@ def test_the_copy_is_what_runs(extended):
     assert where.stdout.startswith(str(extended))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_all_six_work_together(extended):
     for line in COMMANDS:
         assert line.startswith("csm ")

@@ -27,7 +27,7 @@ def test_every_setting_that_it_names_is_there():
     assert set(named) <= set(COMPETITORS)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_its_code_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("CSM_CACHE", str(tmp_path / "store"))

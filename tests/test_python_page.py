@@ -10,7 +10,7 @@ import pytest
 PAGE = (Path(__file__).resolve().parent.parent / "docs" / "python.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_code_of_the_page_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("CSM_CACHE", str(tmp_path / "store"))
@@ -18,7 +18,7 @@ def test_the_code_of_the_page_runs(tmp_path, monkeypatch, capsys):
     for block in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL):
         exec(compile(block, "python.md", "exec"), names)
     printed = capsys.readouterr().out
-    assert "Match(s00_p00 -> s01_p02 by acd, nearest)" in printed
+    assert "Match(s00_p00 -> s01_p02 by acd, nearest+multistart)" in printed
     assert "(6899, 100)" in printed
     assert re.search(r"^humans nearest 0\.\d+$", printed, re.MULTILINE)
     assert re.search(r"^humans argmax 0\.\d+$", printed, re.MULTILINE)

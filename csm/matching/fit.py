@@ -99,9 +99,8 @@ def fit_functional_map(source: Side, target: Side, k: int, weights: FitWeights |
     Examples
     --------
     >>> import csm
-    >>> mesh = csm.load_humans().mesh("s00_p00")
-    >>> operators = csm.Operators(mesh)
-    >>> side = Side(operators.lbo(6), csm.preset("wks", n_energies=12)(operators).values)
+    >>> operators = csm.Operators(csm.load_humans().mesh("s00_p00"))
+    >>> side = Side(operators.lbo(6), operators.mesh.vertices)
     >>> bool(np.abs(fit_functional_map(side, side, 6) - np.eye(6)).max() < 1e-3)
     True
     """

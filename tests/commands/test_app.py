@@ -101,7 +101,7 @@ def test_match_takes_any_names_and_leaves_one_folder(csm, tmp_path):
         write_mesh(tmp_path / name, blob(2))
     status, out, _ = csm("match", *names, "descriptor=wks", "descriptor.k=30", "out=2024")
     assert status == 0
-    assert "100 % of the matched vertices return" in out
+    assert "trustworthy partner" in out
     assert visible(tmp_path) == {*names, "2024"}
     assert (np.loadtxt(tmp_path / "2024/map.txt") == np.arange(162)).mean() > 0.9
     account = json.loads((tmp_path / "2024/match.json").read_text())

@@ -65,8 +65,8 @@ def test_of_several_finalists_the_best_judged_is_taken(store):
     def judged(finalists: int) -> tuple[int, float]:
         """How many maps were compared, and the sum of the scores of the one that was taken."""
         _, text = Multistart(finalists=finalists).search(found.start, pair)
-        numbers = re.findall(r"\d+\.\d+|\d+(?= different)", text)
-        return int(numbers[0]), sum(map(float, numbers[1:]))
+        maps = re.findall(r"(\d+) different maps|one map", text)[0]
+        return int(maps or 1), sum(map(float, re.findall(r"\d+\.\d+", text)))
 
     (n, alone), (several, best) = judged(1), judged(6)
     assert n == 1 < several <= 6
