@@ -10,6 +10,8 @@ from csm.data.store import Store
 from csm.descriptors import HKS
 from csm.errors import ConfigError, MeshError
 from csm.matching import DescriptorMethod, PrecomputedMethod, match_features, match_meshes
+from csm.matching.base import Described
+from csm.matching.match import _against_input
 from csm.matching.nearest import Nearest, nearest
 from csm.mesh.io import write_mesh
 from csm.mesh.shape import Mesh
@@ -90,3 +92,15 @@ def test_features_are_matched_as_they_are():
     np.testing.assert_array_equal(match_features(features, features).indices, nearest(features, features))
     tensors = torch.as_tensor(np.asarray(features))
     np.testing.assert_array_equal(match_features(tensors, features.values).indices, np.arange(162))
+
+
+def test_a_network_that_knows_such_shapes_less_than_its_input_is_warned_of(meshes):
+    ball = meshes[0]
+    known, mixed = torch.tensor(ball.vertices), torch.tensor(ball.vertices[:1]).repeat(ball.n_vertices, 1)
+    lost = Described(ball, mixed + 1e-6 * known, given=known)
+    (said,) = _against_input(lost, lost.__class__(ball, mixed, given=known))
+    assert "try without the checkpoint" in said
+    assert "100 %" in said
+    good = Described(ball, known, given=known)
+    assert _against_input(good, good) == []
+    assert _against_input(Described(ball, known), Described(ball, known)) == []  # no network
