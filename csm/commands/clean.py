@@ -8,12 +8,12 @@ from typing import Any
 from omegaconf import DictConfig
 
 from csm.commands.app import command, write_json
-from csm.commands.outputs import digest, require_file_place, require_new_in_sweep, require_not_input, require_own
+from csm.commands.outputs import require_file_place, require_new_in_sweep, require_not_input, require_own
 from csm.errors import ConfigError
 from csm.evaluation.provenance import provenance
 from csm.mesh.check import check
 from csm.mesh.clean import Cleaned, clean
-from csm.mesh.io import read_polygons, write_map, write_mesh
+from csm.mesh.io import file_digest, read_polygons, write_map, write_mesh
 
 
 def run(cfg: DictConfig) -> dict[str, Any]:
@@ -62,7 +62,7 @@ def write_cleaned(done: Cleaned, source: Path, target: Path, n_faces: int) -> No
         "vertices": {"before": len(done.vertex_map), "after": done.mesh.n_vertices},
         "faces": {"before": n_faces, "after": done.mesh.n_faces},
         "findings": [finding.text for finding in check(done.mesh)],
-        "files": {path.name: digest(path) for path in places(target)},
+        "files": {path.name: file_digest(path) for path in places(target)},
         "command": made.command,
         "commit": made.commit,
         "versions": made.versions,

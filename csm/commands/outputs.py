@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from csm.errors import ConfigError
 from csm.evaluation.report import read_rows
+from csm.mesh.io import file_digest
 
 _OVERWRITE = "give another out=, or overwrite=true to replace it"
 
@@ -92,11 +93,6 @@ def require_results(results: str | None) -> None:
         read_rows(path)
 
 
-def digest(path: Path) -> str:
-    """Return the SHA-256 (hex) of a file."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
 def require_own(outputs: Iterable[Path], account: Path, overwrite: bool) -> None:
     """Raise if an output exists that csm did not write, or that was changed since.
 
@@ -119,7 +115,7 @@ def require_own(outputs: Iterable[Path], account: Path, overwrite: bool) -> None
     files = _files_of(account)
     for path in outputs:
         name = path.relative_to(account.parent).as_posix()
-        if os.path.lexists(path) and (not path.is_file() or files.get(name) != digest(path)):
+        if os.path.lexists(path) and (not path.is_file() or files.get(name) != file_digest(path)):
             why = "has been changed since csm wrote it" if name in files else "was not written by csm here"
             raise ConfigError(f"{path}: there is such a file, which {why}; {_OVERWRITE}")
     if os.path.lexists(account) and not files:

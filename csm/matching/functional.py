@@ -145,8 +145,8 @@ def vertex_map(
     return nearest(_rows(queries, device), _rows(candidates, device))
 
 
-def orthogonal(matrix: FloatArray) -> FloatArray:
-    """Return the nearest matrix (Frobenius) of orthonormal columns, or rows where it is wide: the polar factor.
+def orthogonal(matrices: FloatArray) -> FloatArray:
+    """Return the nearest matrices (..., K, L) of orthonormal columns, or rows if they are wide: the polar factors.
 
     Examples
     --------
@@ -154,9 +154,9 @@ def orthogonal(matrix: FloatArray) -> FloatArray:
     array([[1., 0.],
            [0., 1.]])
     """
-    u, _, v = np.linalg.svd(matrix, full_matrices=False)
-    factor: FloatArray = u @ v
-    return factor
+    u, _, v = np.linalg.svd(matrices, full_matrices=False)
+    factors: FloatArray = u @ v
+    return factors
 
 
 def _rows(values: FloatArray, device: str) -> torch.Tensor:

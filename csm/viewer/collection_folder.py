@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import re
@@ -19,7 +18,7 @@ from csm.errors import ConfigError, DataError
 from csm.evaluation.provenance import provenance
 from csm.matching.collection import MatchedCollection
 from csm.matching.methods import DescriptorMethod
-from csm.mesh.io import atomic_path, copy_file, write_map, write_mesh
+from csm.mesh.io import atomic_path, copy_file, file_digest, write_map, write_mesh
 from csm.mesh.io.guard import refusals
 from csm.viewer.colors import position_colors, pull_colors
 from csm.viewer.html import Panel, Viewer, viewer_html, write_html
@@ -115,7 +114,7 @@ def write_collection(
     with tempfile.TemporaryDirectory(prefix=".csm-", dir=folder) as staged:
         files = _write_files(collection, indices, Path(staged))
         took = {} if seconds is None else {"seconds": round(seconds, 2)}
-        hashes = {name: _digest(Path(staged) / name) for name in files}
+        hashes = {name: file_digest(Path(staged) / name) for name in files}
         account = {**_account(collection, len(wanted)), **took, "files": hashes}
         earlier = _files_of(folder / ACCOUNT)
         with atomic_path(folder / ACCOUNT) as temporary:  # first: what comes after it is known as csm's
@@ -243,10 +242,6 @@ def _map_file(source: str, target: str) -> str:
     return f"maps/{_plain(source)}_to_{_plain(target)}.txt"
 
 
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
 def _files_of(account: Path) -> Mapping[str, str]:
     try:
         files = json.loads(account.read_text(encoding="utf-8")).get("files")
@@ -259,5 +254,5 @@ def _remove(folder: Path, files: Mapping[str, str]) -> None:
     """Remove maps and shapes of an earlier run that are as it wrote them."""
     for name, known in files.items():
         path = folder / name
-        if _OWN.fullmatch(name) and path.is_file() and not path.is_symlink() and _digest(path) == known:
+        if _OWN.fullmatch(name) and path.is_file() and not path.is_symlink() and file_digest(path) == known:
             path.unlink()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import tempfile
@@ -13,7 +12,7 @@ from typing import Any
 from csm.errors import DataError
 from csm.evaluation.provenance import provenance
 from csm.matching import DescriptorMethod, Match
-from csm.mesh.io import atomic_path, copy_file, write_map, write_mesh
+from csm.mesh.io import atomic_path, copy_file, file_digest, write_map, write_mesh
 from csm.mesh.io.guard import refusals
 from csm.mesh.shape import Mesh
 from csm.viewer.colors import position_colors, pull_colors
@@ -86,15 +85,11 @@ def write_match(match: Match, folder: Path, method: str, seconds: float | None =
     with tempfile.TemporaryDirectory(prefix=".csm-", dir=folder) as staged:
         account = _write_files(match, Path(staged), method)
         took = {} if seconds is None else {"seconds": round(seconds, 2)}
-        account = {**account, **took, "files": {n: _digest(Path(staged) / n) for n in FILES}}
+        account = {**account, **took, "files": {n: file_digest(Path(staged) / n) for n in FILES}}
         with atomic_path(folder / ACCOUNT) as temporary:  # first: what of the others comes after it is known as csm's
             temporary.write_text(json.dumps(account, indent=1) + "\n", encoding="utf-8")
         for name in FILES:
             copy_file(Path(staged) / name, folder / name)
-
-
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _write_files(match: Match, folder: Path, method: str) -> dict[str, Any]:

@@ -8,7 +8,6 @@ import pytest
 
 from csm.commands.outputs import (
     checksum,
-    digest,
     require_file_place,
     require_not_input,
     require_own,
@@ -17,6 +16,7 @@ from csm.commands.outputs import (
     require_results,
 )
 from csm.errors import ConfigError, DataError
+from csm.mesh.io import file_digest
 
 
 def test_an_input_is_never_an_output_by_whatever_name(tmp_path):
@@ -39,7 +39,7 @@ def test_what_csm_wrote_may_be_replaced_and_nothing_else(tmp_path):
     with pytest.raises(ConfigError, match=said):
         require_own([path], account, overwrite=False)
     require_own([path], account, overwrite=True)
-    account.write_text(json.dumps({"files": {"map.txt": digest(path)}}))
+    account.write_text(json.dumps({"files": {"map.txt": file_digest(path)}}))
     require_own([path], account, overwrite=False)
     path.write_text("edited")
     with pytest.raises(ConfigError, match="has been changed since csm wrote it"):

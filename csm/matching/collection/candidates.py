@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from csm._types import FloatArray
-from csm.matching.collection.synchronise import polar
+from csm.matching.functional import orthogonal
 from csm.matching.refinement.batch import nearest_rows
 from csm.matching.refinement.joint import least_squares
 from csm.matching.refinement.multistart import Multistart
@@ -55,7 +55,7 @@ def _candidates(starts: Tensor, pair: Pair, refiner: Multistart, k: int, *, sear
     found = refiner.finals(starts, pair) if searched else refiner.solutions(starts, pair)
     order = found.scores.total.argsort()
     maps = found.matrices[order][:, :k, :k].double().cpu().numpy()
-    return Candidates(polar(maps), found.scores.total[order].double().cpu().numpy())
+    return Candidates(orthogonal(maps), found.scores.total[order].double().cpu().numpy())
 
 
 def stacked(candidates: list[Candidates]) -> Candidates:

@@ -12,7 +12,8 @@ import torch
 from torch import Tensor
 
 from csm._types import FloatArray, IntArray
-from csm.matching.collection.synchronise import along_tree, apart, composed, polar, polished, robust
+from csm.matching.collection.synchronise import along_tree, apart, composed, polished, robust
+from csm.matching.functional import orthogonal
 from csm.matching.refinement.batch import nearest_rows
 from csm.matching.refinement.joint import Climb, least_squares
 from csm.matching.refinement.pair import Pair
@@ -29,7 +30,7 @@ def finer(matrix: FloatArray, pair: Pair, climb: Climb, k: int) -> FloatArray:
     given = torch.from_numpy(np.ascontiguousarray(matrix)).float().to(pair.source.device)
     there = _step(given, pair, climb, k)
     back = _step(given.T.contiguous(), pair.reversed, climb, k)
-    return polar((there + back.T).double().cpu().numpy())
+    return orthogonal((there + back.T).double().cpu().numpy())
 
 
 def _step(matrix: Tensor, pair: Pair, climb: Climb, k: int) -> Tensor:

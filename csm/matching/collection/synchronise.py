@@ -27,6 +27,7 @@ from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
 from csm._types import FloatArray, IntArray
 from csm.matching.collection.graph import triangles_of
+from csm.matching.functional import orthogonal
 
 SCALE = 0.25
 """Distance of two maps, see `apart`, from which on an edge counts little."""
@@ -60,13 +61,6 @@ class Agreement:
         """Return the functional map (K, K) of the map i -> j."""
         matrix: FloatArray = self.bases[i] @ self.bases[j].T
         return matrix
-
-
-def polar(matrices: FloatArray) -> FloatArray:
-    """Return the nearest orthogonal matrices (..., K, K)."""
-    u, _, v = np.linalg.svd(matrices)
-    factors: FloatArray = u @ v
-    return factors
 
 
 def apart(first: FloatArray, second: FloatArray) -> FloatArray:
@@ -119,7 +113,7 @@ def synchronise(maps: FloatArray, pairs: IntArray, weights: FloatArray, n: int) 
     vectors = (along_tree(maps, pairs, weights, n) / scale[:, None, None]).reshape(n * k, k)
     for _ in range(_POWERS):  # of flat + 1, whose eigenvalues are not negative
         vectors = np.linalg.qr(flat @ vectors + vectors)[0]
-    return polished(polar(vectors.reshape(n, k, k)), maps, pairs, weights)
+    return polished(orthogonal(vectors.reshape(n, k, k)), maps, pairs, weights)
 
 
 def polished(bases: FloatArray, maps: FloatArray, pairs: IntArray, weights: FloatArray) -> FloatArray:
@@ -129,7 +123,7 @@ def polished(bases: FloatArray, maps: FloatArray, pairs: IntArray, weights: Floa
         total = np.zeros_like(bases)
         np.add.at(total, pairs[:, 0], weights[:, None, None] * (maps @ bases[pairs[:, 1]]))
         np.add.at(total, pairs[:, 1], weights[:, None, None] * (maps.transpose(0, 2, 1) @ bases[pairs[:, 0]]))
-        bases = polar(bases + total / degrees)
+        bases = orthogonal(bases + total / degrees)
     return bases
 
 

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 from csm._types import IntArray
 from csm.matching.base import Described, Matcher
 from csm.matching.maps import VertexMap
+from csm.matching.signals import SAMPLES
 from csm.matching.way import Way
 
 
@@ -49,13 +50,9 @@ class Refiner(ABC):
         return asdict(self)  # type: ignore[call-overload,no-any-return]
 
 
-STARTED = 1000
-"""Vertices, spread over the source, that a map to be refined is computed at."""
-
-
 def start_of(matcher: Matcher, source: Described, target: Described) -> VertexMap:
     """Return the map of a matcher at samples of the source, which is enough to begin a refinement with."""
-    return matcher(source, target, at=source.order[:STARTED])
+    return matcher(source, target, at=source.order[:SAMPLES])
 
 
 @dataclass(frozen=True)

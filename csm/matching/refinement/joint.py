@@ -22,10 +22,11 @@ from csm.matching.barycentric import BarycentricMap, nearest_on_faces
 from csm.matching.base import Described
 from csm.matching.functional import FunctionalMap
 from csm.matching.maps import VertexMap
-from csm.matching.refinement.base import STARTED, RefinedMap, Refiner
+from csm.matching.refinement.base import RefinedMap, Refiner
 from csm.matching.refinement.batch import nearest_rows, orthogonal
 from csm.matching.refinement.clusters import nearest_of_many
 from csm.matching.refinement.pair import Pair
+from csm.matching.signals import SAMPLES
 from csm.matching.way import Way
 
 SCHEDULE = (30, 40, 60, 100, 150, 200)
@@ -155,7 +156,7 @@ class Joint(Refiner):
 
 def first_matrix(indices: IntArray, pair: Pair, k: int) -> Tensor:
     """Return the functional map (k, k) of a map that is known at samples of the source, or at other vertices of it."""
-    samples = pair.source.samples(STARTED)
+    samples = pair.source.samples(SAMPLES)
     known = indices[samples.at] >= 0
     here = samples.at[known] if known.all() else np.flatnonzero(indices >= 0)
     if len(here) < k:

@@ -11,7 +11,7 @@ archives are unpacked by Python's zlib, zipfile and tarfile.
 """
 
 from csm.mesh.io.archives import unpack, unpacked
-from csm.mesh.io.files import atomic_path, copy_file, list_files, list_folders, natural_key, read_bytes
+from csm.mesh.io.files import atomic_path, copy_file, file_digest, list_files, list_folders, natural_key, read_bytes
 from csm.mesh.io.maps import read_labels, read_names, read_pairs, read_vts, write_map
 from csm.mesh.io.meshes import READABLE, WRITABLE, count_vertices, read_mesh, read_polygons, write_mesh
 
@@ -21,6 +21,7 @@ __all__ = [
     "atomic_path",
     "copy_file",
     "count_vertices",
+    "file_digest",
     "list_files",
     "list_folders",
     "natural_key",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import secrets
@@ -162,3 +163,8 @@ def copy_file(source: Path, target: Path) -> None:
     require_regular(source)
     with refusals(source), source.open("rb") as original, atomic_path(target) as new, new.open("wb") as copy:
         shutil.copyfileobj(original, copy, 1 << 20)
+
+
+def file_digest(path: Path) -> str:
+    """Return the SHA-256 (hex) of a file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()

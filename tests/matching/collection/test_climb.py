@@ -8,8 +8,9 @@ from scipy.linalg import expm
 
 import csm
 from csm.matching.collection.climb import consistent, finer
-from csm.matching.collection.synchronise import apart, composed, polar
+from csm.matching.collection.synchronise import apart, composed
 from csm.matching.functional import functional_map
+from csm.matching.functional import orthogonal as polar
 from csm.matching.methods import as_method
 from csm.matching.refinement.pair import Pair
 from tests.matching.collection.copies import QUICK, copies, orders

@@ -12,10 +12,10 @@ from csm.matching.collection.synchronise import (
     along_tree,
     apart,
     composed,
-    polar,
     synchronise,
     triangle_errors,
 )
+from csm.matching.functional import orthogonal as polar
 
 N, K = 7, 6
 ALL = np.array(list(combinations(range(N), 2)))

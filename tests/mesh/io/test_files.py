@@ -7,7 +7,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from csm.errors import DataError
-from csm.mesh.io import atomic_path, copy_file, list_files, list_folders, natural_key, read_bytes, write_mesh
+from csm.mesh.io import (
+    atomic_path,
+    copy_file,
+    file_digest,
+    list_files,
+    list_folders,
+    natural_key,
+    read_bytes,
+    write_mesh,
+)
 from tests.shapes import blob
 
 
@@ -181,3 +190,9 @@ def test_copy_file_names_a_source_that_is_missing_and_a_target_that_cannot_be(tm
     (tmp_path / "a").write_bytes(b"")
     with pytest.raises(DataError, match=r"a/b: cannot be written"):
         copy_file(tmp_path / "a", tmp_path / "a" / "b")
+
+
+def test_the_digest_of_a_file_is_its_sha256(tmp_path):
+    (tmp_path / "abc").write_bytes(b"abc")  # the example of FIPS 180-4
+    wanted = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+    assert file_digest(tmp_path / "abc") == wanted
