@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Sized
+from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any, ParamSpec, TypeVar
 
-from threadpoolctl import threadpool_limits
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from csm._progress import progress_bar
 from csm._workers import Worker, crew, death, ready
@@ -92,6 +93,21 @@ def parallel_map(
             bar.set_postfix_str(label(task), refresh=False)
             bar.update()
     return [results[at] for at in range(len(results))]
+
+
+def thread_map(function: Callable[[T], R], tasks: Sequence[T]) -> list[R]:
+    """Apply a function to every task on as many threads as BLAS may use, with one BLAS thread each.
+
+    It pays where the time goes into libraries that release the interpreter's lock.  In the processes of `parallel_map`,
+    and within another such map, there is one thread.
+    """
+    allowed = min(len(tasks), max((pool["num_threads"] for pool in threadpool_info()), default=1))
+    if allowed < 2:
+        return [function(task) for task in tasks]
+    # A solver may set one BLAS thread and then back what it found: the outer limit keeps two of them from leaving each
+    # other's setting behind.
+    with threadpool_limits(1), ThreadPoolExecutor(allowed) as threads:
+        return list(threads.map(function, tasks))
 
 
 def _run(

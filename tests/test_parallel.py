@@ -1,12 +1,13 @@
 from __future__ import annotations
 
 import os
+import threading
 
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from csm._parallel import in_fresh_process, n_processes, parallel_map
+from csm._parallel import in_fresh_process, n_processes, parallel_map, thread_map
 from csm.errors import ConfigError
 
 
@@ -72,3 +73,16 @@ def test_a_number_of_workers_that_is_none_is_refused(workers):
 @pytest.mark.parametrize("workers", [0, 3, np.int64(3)])
 def test_a_number_of_workers_is_taken_as_it_is(workers):
     assert n_processes(workers, 5) == workers
+
+
+def test_threads_keep_the_order_and_leave_the_blas_limit_as_it_was():
+    before = [pool["num_threads"] for pool in threadpool_info()]
+    assert thread_map(lambda x: x * x, range(50)) == [x * x for x in range(50)]
+    assert [pool["num_threads"] for pool in threadpool_info()] == before
+
+
+def test_threads_within_threads_are_one():
+    def inside(_: int) -> set[int]:
+        return set(thread_map(lambda _: threading.get_ident(), range(4)))
+
+    assert all(len(found) == 1 for found in thread_map(inside, range(4)))

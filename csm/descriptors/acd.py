@@ -129,7 +129,7 @@ class ACD(ByAngle):
     def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, one column per name, in units of 1/area unless normalised."""
         most = min(self.k, operators.mesh.n_vertices)  # a cube has 8 vertices, and no more eigenpairs
-        spectra = [self._spectrum(operators, theta, most) for theta in self.thetas]
+        spectra = self._spectra(operators, most)
         ks = [min(k, most) for k in self._ks]
         damping = np.arange(1, self.order + 2) ** -self.damping
         values = np.hstack([chebyshev_block(s.first(k), self.order) * damping for s in spectra for k in ks])

@@ -94,7 +94,7 @@ class ADD(ByAngle):
 
     def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, (N, J S), in units of 1/area unless normalised."""
-        values = np.hstack([self._block(self._spectrum(operators, theta)) for theta in self.thetas])
+        values = np.hstack([self._block(spectrum) for spectrum in self._spectra(operators)])
         return Features(unit_rows(values) if self.normalise else values, self.columns)
 
     def _block(self, spectrum: Spectrum) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from csm._parallel import thread_map
 from csm._types import FloatArray
 from csm.descriptors.base import Descriptor
 from csm.errors import ConfigError
@@ -30,6 +31,13 @@ class ByAngle(Descriptor):
     def _require_different_angles(self) -> None:
         if self.alpha == 0 and self.angles != 1:
             raise ConfigError(f"{self}: at alpha=0 all {self.angles} blocks would be equal; set angles=1")
+
+    def _spectra(self, operators: Operators, k: int | None = None) -> list[Spectrum]:
+        """Return the `k` smallest eigenpairs for each angle; several threads compute them."""
+        _ = operators.mass  # what all angles share is made before the threads begin
+        if self.alpha > 0:
+            operators.anisotropic(frame=self.frame, sweeps=self.sweeps, smoothing=self.smoothing)
+        return thread_map(lambda theta: self._spectrum(operators, theta, k), self.thetas.tolist())
 
     def _spectrum(self, operators: Operators, theta: float, k: int | None = None) -> Spectrum:
         k = self.k if k is None else k

@@ -86,7 +86,7 @@ class ASMWD(ByAngle):
 
     def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, (N, J S), in units of 1/area unless normalised."""
-        values = np.hstack([meyer_block(self._spectrum(operators, theta), self.n_filters) for theta in self.thetas])
+        values = np.hstack([meyer_block(spectrum, self.n_filters) for spectrum in self._spectra(operators)])
         return Features(unit_rows(values) if self.normalise else values, self.columns)
 
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import os
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
+from csm._parallel import thread_map
 from csm._types import Float32Array
 from csm.data.store import Store
 from csm.descriptors.base import Descriptor
@@ -100,10 +99,7 @@ def _described(method: Method, rule: Matcher, meshes: list[Mesh], store: Store, 
 
     if not isinstance(method, DescriptorMethod) or meshes[0].digest == meshes[1].digest:
         return [describe(mesh) for mesh in meshes]
-    # The eigensolver leaves the interpreter's lock free for most of its time.  It sets one BLAS thread and then back
-    # what it found: the outer limit keeps two solvers from leaving each other's setting behind.
-    with threadpool_limits(1), ThreadPoolExecutor(2) as threads:
-        return list(threads.map(describe, meshes))
+    return thread_map(describe, meshes)  # the eigensolver leaves the interpreter's lock free for most of its time
 
 
 def match_of(

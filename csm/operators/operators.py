@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import logging
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -18,6 +19,7 @@ from csm.mesh.debris import Body, body_of, component_areas
 from csm.mesh.debris import unit_area as with_unit_area
 from csm.mesh.inputs import MeshLike, as_mesh
 from csm.mesh.shape import Mesh
+from csm.operators._factors import Factors
 from csm.operators.frames import FrameKind, face_frames
 from csm.operators.laplacian import (
     AnisotropicStiffness,
@@ -105,6 +107,7 @@ class Operators:
         self.n_components = found.n_components
         self.body = None if found.is_all else _body(self.mesh, found, memo)
         self._memo = memo
+        self._of_thread = threading.local()
         self._said_flat = False
         self._areas: FloatArray | None = None
         self._anisotropic: dict[tuple[FrameKind, int, float], AnisotropicStiffness] = {}
@@ -177,13 +180,16 @@ class Operators:
         }
 
         def solve() -> Spectrum:
-            return self._solve(self.anisotropic(frame=frame, sweeps=sweeps, smoothing=smoothing).at(alpha, theta), k)
+            matrix = self.anisotropic(frame=frame, sweeps=sweeps, smoothing=smoothing).at(alpha, theta)
+            return self._solve(matrix, k, density=np.sqrt(1.0 + alpha))
 
         return self._spectrum("albo", params, solve)
 
-    def _solve(self, matrix: sparse.csr_array, k: int) -> Spectrum:
-        spectrum = eigenpairs(matrix, self.mass, k, name=self.mesh.label)
-        flat = degenerate_faces(self.mesh)
+    def _solve(self, matrix: sparse.csr_array, k: int, density: float = 1.0) -> Spectrum:
+        spectrum = eigenpairs(
+            matrix, self.mass, k, name=self.mesh.label, density=density, factors=self._factors(matrix)
+        )
+        flat = self._flat
         if flat.size == 0:
             return spectrum
         note = f"{flat.size} faces have (almost) no area, the first is face {flat[0]}; the Laplacian floors their area"
@@ -191,6 +197,17 @@ class Operators:
             _log.warning("%s: %s", self.mesh.label, note)
             self._said_flat = True
         return replace(spectrum, notes=(*spectrum.notes, note))
+
+    @cached_property
+    def _flat(self) -> IntArray:
+        return degenerate_faces(self.mesh)
+
+    def _factors(self, matrix: sparse.csr_array) -> Factors:
+        """Return this thread's factors: all Laplacians of a mesh have one pattern."""
+        if not hasattr(self._of_thread, "factors"):
+            self._of_thread.factors = Factors(matrix)
+        found: Factors = self._of_thread.factors
+        return found
 
     def _spectrum(self, kind: str, params: dict[str, Any], solve: Callable[[], Spectrum]) -> Spectrum:
         key = (kind, tuple(params.items()))
@@ -207,7 +224,7 @@ class Operators:
 
     def _larger(self, kind: str, params: dict[str, Any]) -> Spectrum | None:
         """Return a spectrum of the same Laplacian with more eigenpairs that was computed before, if there is one."""
-        for (other, items), spectrum in self._spectra.items():
+        for (other, items), spectrum in list(self._spectra.items()):  # another thread may add to it
             if other == kind and len(spectrum.evals) > params["k"] and {**dict(items), "k": params["k"]} == params:
                 return spectrum
         return None

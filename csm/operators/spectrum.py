@@ -12,7 +12,8 @@ from threadpoolctl import ThreadpoolController
 
 from csm._types import FloatArray
 from csm.errors import ConfigError, MeshError, NumericalError
-from csm.operators._eigensolver import Problem, attempt_once, attempts, residual
+from csm.operators._eigensolver import Pairs, Problem, attempt_once, attempts, residual
+from csm.operators._factors import Factors
 
 _log = logging.getLogger(__name__)
 
@@ -74,13 +75,22 @@ class Spectrum:
         return count
 
 
-def eigenpairs(stiffness: sparse.csr_array, mass: FloatArray, k: int, *, name: str = "mesh") -> Spectrum:
+def eigenpairs(
+    stiffness: sparse.csr_array,
+    mass: FloatArray,
+    k: int,
+    *,
+    name: str = "mesh",
+    density: float = 1.0,
+    factors: Factors | None = None,
+) -> Spectrum:
     """Return the `k` smallest eigenpairs of  S phi = lambda diag(mass) phi.
 
-    Shift-invert block Lanczos from a fixed start on one BLAS thread, or a dense solver for small meshes.  The answer
-    is accepted only if residuals and orthonormality hold and no eigenvalue was passed over (Sylvester's law of
-    inertia: the signs of a factorisation count the eigenvalues below a bound).  Otherwise it is tried again, at most
-    twice, which `Spectrum.notes` records.
+    Shift-invert Lanczos from a fixed start on one BLAS thread, or a dense solver for small meshes.  The answer is
+    accepted only if residuals and orthonormality hold and no eigenvalue was passed over (Sylvester's law of inertia:
+    the signs of a factorisation count the eigenvalues below a bound).  Single Lanczos vectors pass over copies of an
+    eigenvalue, so blocks of them follow where the count says so; if those fail, it is tried again, at most twice, which
+    `Spectrum.notes` records.
 
     Parameters
     ----------
@@ -92,6 +102,11 @@ def eigenpairs(stiffness: sparse.csr_array, mass: FloatArray, k: int, *, name: s
         Number of pairs, from 1 to N.
     name
         The mesh's name in messages.
+    density
+        How many eigenvalues there are below a bound, over as many as the isotropic Laplacian has by Weyl's law: a guess
+        that saves time, not a result.
+    factors
+        For matrices of this pattern, so that its analysis is not made again; not for two threads at once.
 
     Raises
     ------
@@ -104,17 +119,28 @@ def eigenpairs(stiffness: sparse.csr_array, mass: FloatArray, k: int, *, name: s
     """
     _require_solvable(stiffness, mass, k, name)
     scale = 1.0 / np.sqrt(mass)
-    problem = Problem(_symmetrised(stiffness, scale), k, unit=1.0 / mass.sum())
-    notes: list[str] = []
+    matrix, unit = _symmetrised(stiffness, scale), 1.0 / mass.sum()
+    problem = Problem(matrix, k, unit, 4 * np.pi * k * unit / density, factors or Factors(matrix))
     with _blas().limit(limits=1):
-        for attempt in attempts(problem):
-            found, fault = attempt_once(problem, attempt)
-            if found is not None:
-                evals = np.where(found.evals < _ZERO * problem.unit, 0.0, found.evals)
-                evecs = _with_fixed_signs(scale[:, None] * found.evecs)
-                return Spectrum(evals, evecs, mass, residual(problem, found), tuple(notes))
-            notes.append(f"{k} eigenpairs by {attempt.method}: {fault}")
-            _log.warning("%s: %s", name, notes[-1])
+        found, notes = _solved(problem, name)
+        evals = np.where(found.evals < _ZERO * problem.unit, 0.0, found.evals)
+        evecs = _with_fixed_signs(scale[:, None] * found.evecs)
+        return Spectrum(evals, evecs, mass, residual(problem, found), notes)
+
+
+def _solved(problem: Problem, name: str) -> tuple[Pairs, tuple[str, ...]]:
+    """Return the pairs of the first attempt that passes the checks, and notes of those before."""
+    notes: list[str] = []
+    for attempt in attempts(problem):
+        found, fault = attempt_once(problem, attempt)
+        if found is not None:
+            return found, tuple(notes)
+        said = f"{problem.k} eigenpairs by {attempt.method}: {fault}"
+        if attempt.block == 1:  # a shape with symmetries has copies of eigenvalues: nothing is wrong with it
+            _log.debug("%s: %s", name, said)
+        else:
+            _log.warning("%s: %s", name, said)
+            notes.append(said)
     raise NumericalError(f"{name}: no attempt gave sound eigenpairs ({'; '.join(notes)}); run `csm check` on the mesh")
 
 
@@ -142,10 +168,10 @@ def _require_solvable(stiffness: sparse.csr_array, mass: FloatArray, k: int, nam
 
 
 def _symmetrised(stiffness: sparse.csr_array, scale: FloatArray) -> sparse.csc_array:
-    """Return M^-1/2 S M^-1/2, whose eigenvalues are those of the generalised problem."""
-    coo = stiffness.tocoo()
-    data = coo.data * scale[coo.row] * scale[coo.col]
-    return sparse.csc_array((data, (coo.row, coo.col)), shape=stiffness.shape)
+    """Return M^-1/2 S M^-1/2, whose eigenvalues are those of the generalised problem; rows and columns are the same."""
+    stiffness.sort_indices()
+    data = stiffness.data * np.repeat(scale, np.diff(stiffness.indptr)) * scale[stiffness.indices]
+    return sparse.csc_array((data, stiffness.indices, stiffness.indptr), shape=stiffness.shape)
 
 
 def _with_fixed_signs(evecs: FloatArray) -> FloatArray:

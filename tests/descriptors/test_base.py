@@ -125,7 +125,9 @@ ASKING = [
 def test_a_descriptor_says_how_many_eigenpairs_it_asks_for(descriptor, monkeypatch):
     asked = [0]
     solve = Operators._solve
-    monkeypatch.setattr(Operators, "_solve", lambda self, matrix, k: asked.append(k) or solve(self, matrix, k))
+    monkeypatch.setattr(
+        Operators, "_solve", lambda self, matrix, k, **hint: asked.append(k) or solve(self, matrix, k, **hint)
+    )
     descriptor(blob(3))
     assert max(asked) == descriptor.eigenpairs
 
