@@ -55,13 +55,15 @@ def descriptor_configs() -> dict[str, Mapping[str, Any]]:
     """Return the presets of descriptors: the class and all its parameters."""
     from csm.descriptors.presets import PRESETS
 
-    return {
-        name: {
-            "_target_": f"csm.descriptors.{type(descriptor).__name__}",
-            **{f.name: _plain(getattr(descriptor, f.name)) for f in fields(descriptor)},
-        }
-        for name, descriptor in PRESETS.items()
-    }
+    return {name: _descriptor_config(descriptor) for name, descriptor in PRESETS.items()}
+
+
+def _descriptor_config(descriptor: Any) -> dict[str, Any]:
+    found = {f.name: _plain(getattr(descriptor, f.name)) for f in fields(descriptor)}
+    if "parts" in found:
+        parts = {name: _descriptor_config(part) for name, part in found["parts"].items()}
+        found = {"_convert_": "all", "parts": parts}  # Hydra would hand over a configuration of descriptors
+    return {"_target_": f"csm.descriptors.{type(descriptor).__name__}", **found}
 
 
 def model_configs() -> dict[str, Mapping[str, Any]]:

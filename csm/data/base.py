@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from csm._parallel import n_processes
+from csm.data.additional import additional
 from csm.data.folders import FolderSet, Layout
 from csm.data.prepare import Job, Prepared, Recipe, is_prepared, prepare, prepare_mesh
 from csm.data.shapes import InMemory, Shape, ShapeSet
@@ -45,13 +46,16 @@ class DataModule:
         Processes for the preparation and for the distances of tests, see `csm._parallel.n_processes`.
     stencils
         What else the network needs of a shape, see `csm.operators.stencils`.
+    also
+        Names of additional training shapes, see `csm.data.additional`: "remeshed_5000" are the fitted shapes with other
+        triangles, "humans" the built-in ones, which have a template, and in training a classifier, of their own.
 
     Raises
     ------
     DataError
         If a set is there twice among the test sets, or no training shape is left to fit.
     ConfigError
-        If `workers` is no number of processes.
+        If `workers` is no number of processes, or there are no additional shapes of such a name.
     """
 
     def __init__(
@@ -66,6 +70,7 @@ class DataModule:
         store: Store | None = None,
         workers: int | None = None,
         stencils: Sequence[Stencil] = (),
+        also: Sequence[str] = (),
     ) -> None:
         n_processes(workers, 0)  # what is no number is refused before anything is read
         self.train_set, *tests = distinct([train_set, *test_sets])
@@ -75,6 +80,7 @@ class DataModule:
         self.store = store or Store()
         self.fit_names, held_out = split.held_out(holdout)
         self.validation_names = held_out or split.train[-10:]
+        self.also = tuple(additional(text, self.train_set, self.fit_names, self.store) for text in also)
         self._shapes: dict[str, Shape] = {}
 
     @property
@@ -82,10 +88,9 @@ class DataModule:
         """One sentence for logs and results: what is fitted and what is validated on."""
         seen = f"the last {len(self.validation_names)} training shapes, which are also fitted"
         held = f"{self.holdout} held-out training shapes"
-        return (
-            f"split {self.split.label}; fitted on {len(self.fit_names)} shapes of {self.train_set.name}, "
-            f"validated on {held if self.holdout else seen}"
-        )
+        sets = [(self.fit_names, self.train_set), *((more.names, more.shapes) for more in self.also)]
+        fitted = " and ".join(f"{len(names)} shapes of {shapes.name}" for names, shapes in sets)
+        return f"split {self.split.label}; fitted on {fitted}, validated on {held if self.holdout else seen}"
 
     def train_names(self) -> tuple[str, ...]:
         """Return the names of the split's training shapes; DataError if the set lacks one."""
@@ -115,11 +120,12 @@ class DataModule:
         """
         names = self.train_names()
         jobs = [job for name in names if (job := self._missing(name)) is not None]
+        jobs += [Job(more.shapes, name) for more in self.also for name in more.names]
         if not jobs:
             return
         summary = prepare(jobs, [self.recipe], self.store, workers=self.workers)
         if summary.failures:
-            raise DataError(f"{len(summary.failures)} of {len(names)} shapes cannot be used:\n{summary.table()}")
+            raise DataError(f"{len(summary.failures)} of {len(jobs)} shapes cannot be used:\n{summary.table()}")
 
     def _missing(self, name: str) -> Job | None:
         """Return what remains to be prepared of a training shape, or None if the store has everything."""
@@ -139,6 +145,11 @@ class DataModule:
     def n_classes(self) -> int:
         """Number of template points."""
         return self.shape(self.fit_names[0]).truth.n_from
+
+    @property
+    def also_classes(self) -> dict[str, int]:
+        """Number of template points of each further template of the additional shapes, by its name."""
+        return {more.template: more.n_classes for more in self.also if more.template}
 
     def validation_shapes(self) -> list[Shape]:
         """Return the meshes and truths of the validation shapes."""

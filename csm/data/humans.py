@@ -20,12 +20,12 @@ from csm.data.base import DataModule, DataSet
 from csm.data.shapes import Shape
 from csm.data.splits import Split, as_split
 from csm.data.store import Store
+from csm.data.variants import remeshed
 from csm.errors import ConfigError, DataError
 from csm.mesh.correspondence import Direction, PointMap
-from csm.mesh.remesh import refine, remesh
 from csm.mesh.shape import Mesh
 
-Variant: TypeAlias = Literal["original", "refined", "remeshed"]
+Form: TypeAlias = Literal["original", "refined", "remeshed"]
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ class HumansSet:
         Of the remeshing.
     """
 
-    variant: Variant = "original"
+    variant: Form = "original"
     n_vertices: int = 0
     store_root: str | None = None
     seed: int = 0
@@ -201,7 +201,7 @@ class HumansSet:
         'humans_refined_10000'
         """
         variant, _, count = text.partition("_")
-        if variant not in get_args(Variant) or (variant == "original") != (count == "") or not (count or "0").isdigit():
+        if variant not in get_args(Form) or (variant == "original") != (count == "") or not (count or "0").isdigit():
             raise ConfigError(
                 f"built-in humans: {text!r} is not the name of a set; wanted original, refined_N or remeshed_N"
             )
@@ -228,19 +228,6 @@ class HumansSet:
         truth = PointMap(made["truth"], Direction.TEMPLATE_TO_SHAPE, mesh.n_vertices, name)
         mirror = PointMap(made["truth"][flip], Direction.TEMPLATE_TO_SHAPE, mesh.n_vertices, f"{name}, mirrored")
         return Shape(mesh, truth, mirror)
-
-
-def remeshed(original: Mesh, variant: str, n_vertices: int, seed: int, store: Store) -> Arrays:
-    """Return vertices, faces and truth (the vertex of every original one) of a "refined" or "remeshed" mesh.
-
-    It is computed once and kept in the store.
-    """
-
-    def make() -> Arrays:
-        made = (refine if variant == "refined" else remesh)(original, n_vertices, seed)
-        return {"vertices": made.mesh.vertices, "faces": made.mesh.faces, "truth": made.truth.indices}
-
-    return store.fetch("remesh", original, {"variant": variant, "n_vertices": n_vertices, "seed": seed}, make)
 
 
 def _names(persons: Sequence[int], poses: Sequence[int]) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from csm._types import Arrays, Float32Array, FloatArray
 from csm.data.shapes import ShapeSet
 from csm.data.store import Store
 from csm.descriptors.base import Descriptor, record
+from csm.descriptors.stack import Stack
 from csm.errors import CsmError, MeshError
 from csm.mesh.check import require_usable
 from csm.mesh.debris import body_of, unit_area
@@ -109,12 +110,14 @@ def features_of(mesh: Mesh, descriptor: Descriptor, store: Store, operators: Ope
     mesh
         The shape, at any scale.
     descriptor
-        It is looked up, and kept, by its parameters.
+        It is looked up, and kept, by its parameters; of a stack each part by itself.
     store
         Where it is kept.
     operators
         Of the mesh at unit area, so that several descriptors share their eigenpairs.
     """
+    if isinstance(descriptor, Stack):
+        return np.hstack([features_of(mesh, part, store, operators) for part in descriptor.parts.values()])
 
     def make() -> dict[str, Float32Array]:
         if operators is None:
@@ -164,7 +167,8 @@ def prepare_mesh(mesh: Mesh, recipe: Recipe, store: Store, operators: Operators 
 
 def is_prepared(mesh: Mesh, recipe: Recipe, store: Store) -> bool:
     """Tell whether `prepare_mesh` would find everything in the store; nothing is read."""
-    if not store.has("descriptor", mesh, _key(mesh, recipe.descriptor)):
+    parts = recipe.descriptor.parts.values() if isinstance(recipe.descriptor, Stack) else [recipe.descriptor]
+    if not all(store.has("descriptor", mesh, _key(mesh, part)) for part in parts):
         return False
     if not recipe.basis_k and not recipe.stencils:
         return True

@@ -131,6 +131,8 @@ def _fit(training: Training, folder: Path, resume: Path | str | None) -> Trained
     loaded = LightningData(training.data)
     loaded.prepare_data()
     module = make_module(training, loaded.n_features, trainer.max_epochs)
+    if module.inputs is not None:
+        module.inputs.learn(sample.features for sample in loaded.fitted())
     begun = time.perf_counter()
     with saying(lambda: _what_is_kept(folder, trainer)), _interruptible():
         trainer.fit(module, datamodule=loaded, ckpt_path=begin, weights_only=True)
@@ -187,10 +189,12 @@ def make_module(training: Training, n_features: int, epochs: int | None = None) 
         n_classes=data.n_classes,
         descriptor=record(data.recipe.descriptor),
         basis_k=data.recipe.basis_k,
+        also_classes=data.also_classes,
         **training.options,
         training={
             "name": training.name,
             "set": data.train_set.name,
+            "also": [more.shapes.name for more in data.also],
             "protocol": data.protocol,
             "seed": training.seed,
             "epochs": epochs,

@@ -39,7 +39,7 @@ def export_module(module: CSMModule, folder: Path, *, classifier: bool = False) 
     """
     weights = {
         name: tensor.detach().cpu().contiguous()
-        for name, tensor in module.network.state_dict().items()
+        for name, tensor in module.weights().items()
         if classifier or not name.startswith("classifier.")
     }
     with atomic_path(folder / WEIGHTS) as temporary:
@@ -135,12 +135,15 @@ def _load_export(path: Path) -> CSMModule:
         raise DataError(
             f"{path.with_name(WEIGHTS)}: cannot be read ({error}); it belongs beside {path.name}"
         ) from error
-    own = {name: tensor.shape for name, tensor in module.network.state_dict().items()}
+    own = {name: tensor.shape for name, tensor in module.weights().items()}
     given = {name: tensor.shape for name, tensor in weights.items()}
     for name in sorted(own.keys() | given.keys()):
         spared = name.startswith("classifier.") and name not in given
         if not spared and own.get(name) != given.get(name):
             raise DataError(f"{path}: the weights beside it belong to another network (they differ in {name})")
-    module.network.load_state_dict(weights, strict=False)
+    with torch.no_grad():
+        for name, tensor in module.weights().items():
+            if name in weights:
+                tensor.copy_(weights[name])
     module.has_classifier = "classifier.weight" in weights
     return module

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import lightning as L
 from torch.utils.data import DataLoader
 
 from csm.data.base import DataModule
+from csm.data.prepare import prepare_mesh
 from csm.learning.samples import ShapeSample, shape_sample
 
 
@@ -43,14 +45,27 @@ class LightningData(L.LightningDataModule):
         """Width P of the input features."""
         return self.sample(self.data.fit_names[0]).features.shape[1]
 
+    def fitted(self) -> list[ShapeSample]:
+        """Return the tensors of the fitted shapes and of those that are added to them."""
+        return [self.sample(name) for name in self.data.fit_names] + self._also
+
+    @cached_property
+    def _also(self) -> list[ShapeSample]:
+        found = []
+        for more in self.data.also:
+            for name in more.names:
+                shape = more.shapes.load(name)
+                prepared = prepare_mesh(shape.mesh, self.data.recipe, self.data.store)
+                found.append(shape_sample(prepared, shape.truth, more.template))
+        return found
+
     def train_dataloader(self) -> DataLoader[ShapeSample]:
         """Return the fitted shapes in random order."""
-        return self._loader(self.data.fit_names, shuffle=True)
+        return self._loader(self.fitted(), shuffle=True)
 
     def val_dataloader(self) -> DataLoader[ShapeSample]:
         """Return the validation shapes in order."""
-        return self._loader(self.data.validation_names, shuffle=False)
+        return self._loader([self.sample(name) for name in self.data.validation_names], shuffle=False)
 
-    def _loader(self, names: Sequence[str], shuffle: bool) -> DataLoader[ShapeSample]:
-        samples = [self.sample(name) for name in names]
+    def _loader(self, samples: Sequence[ShapeSample], shuffle: bool) -> DataLoader[ShapeSample]:
         return DataLoader(samples, batch_size=None, shuffle=shuffle)  # type: ignore[arg-type]

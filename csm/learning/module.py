@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, Literal
 
 import lightning as L
 import torch
 from scipy.spatial.transform import Rotation
-from torch import Tensor
+from torch import Tensor, nn
 from torch.optim import Adam
 from torch.optim.lr_scheduler import CosineAnnealingLR, LRScheduler, OneCycleLR, StepLR
 
@@ -40,6 +41,9 @@ class CSMModule(L.LightningModule):
         Name and parameters of the input descriptor, kept in the checkpoint so that it can be computed for any mesh.
     basis_k
         Eigenpairs of the basis that the network was trained with.
+    also_classes
+        Number of template points of each further template that training shapes have, by the name of the template.  Each
+        has a classifier of its own, which only serves the training.
     lr, weight_decay
         Of Adam (betas 0.9 and 0.999, eps 1e-8).
     schedule
@@ -51,6 +55,9 @@ class CSMModule(L.LightningModule):
         How many labelled vertices, drawn anew in every training step, the loss is taken over; None for all.  The
         classifier is most of the cost of a step, so 1024 of 6890 make it several times faster; the gradient is that
         of all vertices on average.
+    standardise
+        Give every column of the input mean 0 and deviation 1 over the training shapes, and cut what is more than 10
+        deviations off (`Standardisation`).
     rotate
         Turn the input features, which must be vertex positions (descriptor "xyz"), by a rotation drawn anew in every
         training step, any as likely as any other, so that the network learns not to depend on how a shape stands.
@@ -65,11 +72,13 @@ class CSMModule(L.LightningModule):
         n_classes: int,
         descriptor: dict[str, Any],
         basis_k: int = 128,
+        also_classes: dict[str, int] | None = None,
         lr: float = 1e-3,
         weight_decay: float = 0.0,
         schedule: Schedule = "constant",
         loss_products: Products = "float32",
         loss_rows: int | None = None,
+        standardise: bool = False,
         rotate: bool = False,
         training: dict[str, Any] | None = None,
         format: int = FORMAT,
@@ -90,6 +99,9 @@ class CSMModule(L.LightningModule):
                 "smaller model.ks"
             )
         self.has_classifier = True
+        self.inputs = Standardisation(in_channels) if standardise else None
+        width = self.network.classifier.in_features
+        self.others = nn.ModuleDict({name: nn.Linear(width, n) for name, n in (also_classes or {}).items()})
         self.lr, self.weight_decay, self.schedule = lr, weight_decay, schedule
         if loss_rows is not None and loss_rows < 1:
             raise ConfigError(f"loss_rows={loss_rows}; wanted a number of vertices from 1, or none for all")
@@ -104,17 +116,29 @@ class CSMModule(L.LightningModule):
 
     def forward(self, features: Tensor, surface: Surface) -> Tensor:
         """Return the learned descriptor, shape (N, Q)."""
-        return self.network.describe(features, surface)
+        return self.network.describe(features if self.inputs is None else self.inputs(features), surface)
+
+    def weights(self) -> dict[str, Tensor]:
+        """Return the tensors that a trained network consists of: those of the network, and of its standardisation."""
+        found = dict(self.network.state_dict())
+        return found if self.inputs is None else found | self.inputs.state_dict(prefix="inputs.")
 
     def loss(self, descriptor: Tensor, sample: ShapeSample) -> Tensor:
         """Cross-entropy of the classifier over the rows with a known template point (in training, a draw of them)."""
-        classifier = self.network.classifier
+        classifier = self.classifier(sample.template)
         rows, classes = sample.rows, sample.classes
         if self.training and self.loss_rows is not None and self.loss_rows < len(rows):
             drawn = torch.randperm(len(rows), device=rows.device)[: self.loss_rows]
             rows, classes = rows[drawn], classes[drawn]
         x = self.network.dropout(descriptor[rows])
-        return linear_cross_entropy(x, classifier.weight, classifier.bias, classes, products=self.loss_products)
+        weight, bias = classifier.weight, classifier.bias
+        return linear_cross_entropy(x, weight, bias, classes, products=self.loss_products)
+
+    def classifier(self, template: str) -> nn.Linear:
+        """Return the classifier over the points of a template; that of the training set has no name."""
+        found = self.others[template] if template else self.network.classifier
+        assert isinstance(found, nn.Linear)
+        return found
 
     def training_step(self, sample: ShapeSample) -> Tensor:
         """One shape: loss of its labelled vertices."""
@@ -161,6 +185,39 @@ class CSMModule(L.LightningModule):
             case "one_cycle":
                 return OneCycleLR(optimizer, self.lr, total_steps=steps + 1)  # it is stepped once after the last step
         raise ConfigError(f"schedule is constant, cosine, step, drop or one_cycle, got {self.schedule!r}")
+
+
+class Standardisation(nn.Module):
+    """Columns of the input with mean 0 and deviation 1 over the training shapes.
+
+    Parameters
+    ----------
+    columns
+        Width P of the input.
+    limit
+        Deviations from the mean at which a value is cut: a sliver's must not drown the others.
+    """
+
+    mean: Tensor
+    deviation: Tensor
+
+    def __init__(self, columns: int, limit: float = 10.0) -> None:
+        super().__init__()
+        self.limit = limit
+        self.register_buffer("mean", torch.zeros(columns))
+        self.register_buffer("deviation", torch.ones(columns))
+
+    def learn(self, shapes: Iterable[Tensor]) -> None:
+        """Take means and deviations over shapes, each of shape (N, P), which count alike whatever their N."""
+        moments = [torch.stack([x.double().mean(0), x.double().square().mean(0)]) for x in shapes]
+        mean, square = torch.stack(moments).mean(0)
+        deviation = (square - mean.square()).clamp(min=0).sqrt()
+        self.mean.copy_(mean)
+        self.deviation.copy_(torch.where(deviation > 1e-7 * mean.abs(), deviation, 1.0))  # a constant column stays 0
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Return the input, shape (N, P), standardised and cut."""
+        return ((x - self.mean) / self.deviation).clamp(-self.limit, self.limit)
 
 
 def random_rotation() -> Tensor:

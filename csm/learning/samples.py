@@ -33,7 +33,7 @@ class ShapeSample(NamedTuple):
     """One training shape.
 
     Shapes: `features` (N, P); `surface` with K eigenpairs; `rows` (R,) vertices with a known template point and
-    `classes` (R,) that point.
+    `classes` (R,) that point of the `template`, which has no name if it is that of the training set.
     """
 
     name: str
@@ -41,6 +41,7 @@ class ShapeSample(NamedTuple):
     surface: Surface
     rows: Tensor
     classes: Tensor
+    template: str = ""
 
 
 def network_input(prepared: Prepared) -> NetworkInput:
@@ -53,11 +54,11 @@ def network_input(prepared: Prepared) -> NetworkInput:
     return NetworkInput(torch.as_tensor(prepared.features), Surface(basis, stencils))
 
 
-def shape_sample(prepared: Prepared, truth: PointMap) -> ShapeSample:
-    """Convert a prepared mesh and its map from the template to a training sample."""
+def shape_sample(prepared: Prepared, truth: PointMap, template: str = "") -> ShapeSample:
+    """Convert a prepared mesh and its map from a template to a training sample."""
     classes = np.flatnonzero(truth.indices >= 0)
     rows = torch.as_tensor(truth.indices[classes])
-    return ShapeSample(prepared.mesh.name, *network_input(prepared), rows, torch.as_tensor(classes))
+    return ShapeSample(prepared.mesh.name, *network_input(prepared), rows, torch.as_tensor(classes), template)
 
 
 def _tensors(arrays: Arrays) -> dict[str, Tensor]:

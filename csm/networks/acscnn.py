@@ -136,7 +136,7 @@ class ACSCNN(ConvolutionalNetwork):
         """Return the anisotropic Laplacians of all angles, and the square roots of the vertex areas, shape (N, 1)."""
         return laplacians_of(surface), surface.basis.mass.sqrt()[:, None]
 
-    def activated(self, x: Tensor, layer: int) -> Tensor:
+    def activated(self, x: Tensor, layer: int, surface: Surface) -> Tensor:
         """Return the output `x`, shape (N, C), of a layer after batch normalisation (of convolutions only) and ReLU."""
         return torch.relu(self.norms[layer](x) if layer < len(self.norms) else x)
 

@@ -113,11 +113,11 @@ class ConvolutionalNetwork(CorrespondenceNetwork):
     def operators(self, surface: Surface, dtype: torch.dtype) -> tuple[Any, ...]:
         """Return the arguments that every convolution takes after the functions, which have the given dtype."""
 
-    def lifted(self, x: Tensor) -> Tensor:
+    def lifted(self, x: Tensor, surface: Surface) -> Tensor:
         """Return the input of the first convolution, x_0; by default this is the input descriptor, shape (N, P)."""
         return x
 
-    def activated(self, x: Tensor, layer: int) -> Tensor:
+    def activated(self, x: Tensor, layer: int, surface: Surface) -> Tensor:
         """Return the output `x`, shape (N, C), of a layer after its activation, which is ELU by default.
 
         Layers 0 to L - 1 are the convolutions, and layer L is `embed`.
@@ -127,7 +127,7 @@ class ConvolutionalNetwork(CorrespondenceNetwork):
     def describe(self, x: Tensor, surface: Surface) -> Tensor:
         """Return the learned descriptor, shape (N, Q), of the input descriptor `x`, shape (N, P)."""
         operators = self.operators(surface, x.dtype)
-        x = self.lifted(x)
+        x = self.lifted(x, surface)
         for layer, conv in enumerate(self.convs):
-            x = self.activated(conv(x, *operators), layer)
-        return self.activated(self.embed(x), len(self.convs))
+            x = self.activated(conv(x, *operators), layer, surface)
+        return self.activated(self.embed(x), len(self.convs), surface)

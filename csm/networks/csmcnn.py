@@ -13,7 +13,7 @@ from csm.networks.base import ConvolutionalNetwork
 from csm.networks.csmconv import BiasDomain, CSMConv
 from csm.networks.surface import Surface
 
-Normalisation = Literal["batch", "instance", "none"]
+Normalisation = Literal["batch", "instance", "area", "none"]
 Activation = Literal["relu", "elu", "leaky_relu", "gelu"]
 
 ACTIVATIONS: dict[str, type[nn.Module]] = {
@@ -46,9 +46,10 @@ class CSMCNN(ConvolutionalNetwork):
         Number of Chebyshev polynomials per convolution, T_0 .. T_{terms-1}.
     normalisation
         What every layer is followed by before its activation: "batch" (with running statistics at test time),
-        "instance" (with each shape's own statistics, in training and at test time) or "none".
+        "instance" (with each shape's own statistics, in training and at test time), "area" (the same with every vertex
+        weighted by its area, so that it depends less on the triangulation) or "none".
     momentum, eps
-        Options of the batch normalisation, in PyTorch's sense; the instance normalisation has the same `eps`.
+        Options of the batch normalisation, in PyTorch's sense; the other normalisations have the same `eps`.
     dropout
         Dropout between the learned descriptor and the classifier.
     activation
@@ -96,14 +97,14 @@ class CSMCNN(ConvolutionalNetwork):
         """Return the basis of the K_s lowest eigenpairs."""
         return (surface.basis.first(self.ks),)
 
-    def lifted(self, x: Tensor) -> Tensor:
+    def lifted(self, x: Tensor, surface: Surface) -> Tensor:
         """Return the first linear layer's output, shape (N, channels[0]), of the input descriptor, shape (N, P)."""
-        y: Tensor = self.finish[0](self.lift(x))
+        y: Tensor = self.finish[0](self.lift(x), surface.basis.mass)
         return y
 
-    def activated(self, x: Tensor, layer: int) -> Tensor:
+    def activated(self, x: Tensor, layer: int, surface: Surface) -> Tensor:
         """Return the output `x`, shape (N, C), of a layer after its normalisation and activation."""
-        y: Tensor = self.finish[layer + 1](x)
+        y: Tensor = self.finish[layer + 1](x, surface.basis.mass)
         return y
 
     def filters(self, evals: Tensor) -> dict[str, Tensor]:
@@ -125,27 +126,48 @@ class CSMCNN(ConvolutionalNetwork):
 class VertexNorm(nn.Module):
     """Normalise each channel by its mean and variance over the vertices of the shape, then scale and shift it.
 
+    Parameters
+    ----------
+    channels
+        Number C of channels.
+    eps
+        Added to the variance.
+    by_area
+        Weight every vertex by its area.
+
     Shapes
     ------
-    input and output (N, C); weight and bias (C,).
+    input and output (N, C); areas (N,); weight and bias (C,).
     """
 
-    def __init__(self, channels: int, eps: float) -> None:
+    def __init__(self, channels: int, eps: float, by_area: bool = False) -> None:
         super().__init__()
-        self.eps = eps
+        self.eps, self.by_area = eps, by_area
         self.weight = nn.Parameter(torch.ones(channels))
         self.bias = nn.Parameter(torch.zeros(channels))
 
-    def forward(self, x: Tensor) -> Tensor:
-        """Return the functions `x`, shape (N, C), normalised over the N vertices."""
-        centred = x - x.mean(0)
-        y: Tensor = centred * (centred.square().mean(0) + self.eps).rsqrt() * self.weight + self.bias
+    def forward(self, x: Tensor, areas: Tensor) -> Tensor:
+        """Return the functions `x`, shape (N, C), normalised over the N vertices, which have these areas."""
+        share = (areas if self.by_area else torch.ones_like(areas)).to(x.dtype)
+        share = share / share.sum()
+        centred = x - share @ x
+        y: Tensor = centred * (share @ centred.square() + self.eps).rsqrt() * self.weight + self.bias
         return y
+
+
+class Finishing(nn.ModuleList):
+    """What follows a layer: its normalisation, if it has one, and its activation."""
+
+    def forward(self, x: Tensor, areas: Tensor) -> Tensor:
+        """Return the functions `x`, shape (N, C), on a shape with these vertex areas, shape (N,), finished."""
+        for layer in self:
+            x = layer(x, areas) if isinstance(layer, VertexNorm) else layer(x)
+        return x
 
 
 def finishing(
     width: int, normalisation: Normalisation, activation: Activation, momentum: float, eps: float
-) -> nn.Sequential:
+) -> Finishing:
     """Return what follows a layer of this width: its normalisation, if it has one, and its activation.
 
     Raises
@@ -156,10 +178,10 @@ def finishing(
     if activation not in ACTIVATIONS:
         raise ValueError(f"activation must be one of {', '.join(ACTIVATIONS)}, got {activation!r}")
     if normalisation not in get_args(Normalisation):
-        raise ValueError(f'normalisation must be "batch", "instance" or "none", got {normalisation!r}')
+        raise ValueError(f'normalisation must be "batch", "instance", "area" or "none", got {normalisation!r}')
     layers: list[nn.Module] = [ACTIVATIONS[activation]()]
     if normalisation == "batch":
         layers.insert(0, nn.BatchNorm1d(width, eps=eps, momentum=momentum))
-    elif normalisation == "instance":
-        layers.insert(0, VertexNorm(width, eps))
-    return nn.Sequential(*layers)
+    elif normalisation in ("instance", "area"):
+        layers.insert(0, VertexNorm(width, eps, by_area=normalisation == "area"))
+    return Finishing(layers)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from torch import Tensor, nn
 
 from csm.networks.base import CorrespondenceNetwork
-from csm.networks.csmcnn import Activation, Normalisation, finishing
+from csm.networks.csmcnn import Activation, Finishing, Normalisation, finishing
 from csm.networks.surface import Surface
 
 
@@ -49,6 +49,7 @@ class MLP(CorrespondenceNetwork):
         self.add_classifier(widths[-1], n_classes, dropout)
 
     def describe(self, x: Tensor, surface: Surface) -> Tensor:
-        """Return the learned descriptor, shape (N, Q), of the input `x`, shape (N, P); the surface is not used."""
-        y: Tensor = self.layers(x)
-        return y
+        """Return the learned descriptor, shape (N, Q), of the input `x`, shape (N, P); of the surface, areas count."""
+        for layer in self.layers:
+            x = layer(x, surface.basis.mass) if isinstance(layer, Finishing) else layer(x)
+        return x

@@ -38,6 +38,9 @@ MODELS: dict[str, dict[str, Any]] = {
     # also has a spectral bias, which makes the output depend on the signs of the eigenvectors; bias="spectral"
     # reproduces that, and this setting keeps the spatial bias.
     "csmcnn_release": {"name": "csmcnn", "momentum": 1e-3, "eps": 1e-3},
+    # csm's own setting, for descriptor=acd_two_bands with learning.standardise=true (experiment=faust): what each part
+    # is worth is in docs/lab.md.
+    "csmcnn_own": {"name": "csmcnn", "ks": 256, "terms": 12, "normalisation": "area"},
     # ACSCNN as released (Li et al. 2020): six layers of 16 Chebyshev polynomials of 8 anisotropic Laplacians. Only the
     # frame differs: that of the authors (frame="released") depends on the pose in space, and the average of lines does
     # not. The authors' input is a constant; the paper compares with 48 columns, which is the width of acd_release.

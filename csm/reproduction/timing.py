@@ -18,8 +18,9 @@ from threadpoolctl import threadpool_limits
 from csm._parallel import in_fresh_process
 from csm._progress import progress_bar
 from csm._types import Arrays, FloatArray, IntArray
-from csm.data.humans import HumansSet, remeshed
+from csm.data.humans import HumansSet
 from csm.data.registry import find_set
+from csm.data.variants import Variant, remeshed
 from csm.descriptors.base import record
 from csm.descriptors.presets import from_parameters, preset
 from csm.errors import ConfigError, DataError
@@ -62,7 +63,7 @@ def timed_mesh(context: Context, size: int) -> tuple[Mesh, str]:
     except DataError:
         humans = HumansSet()
         original, whence = humans.load(humans.names[0]).mesh, f"built-in human {humans.names[0]}"
-    variant = "refined" if size > original.n_vertices else "remeshed"
+    variant: Variant = "refined" if size > original.n_vertices else "remeshed"
     arrays = remeshed(original, variant, size, context.seed, context.store)
     return Mesh(arrays["vertices"], arrays["faces"], original.name), f"{whence}, {variant}"
 

@@ -114,7 +114,7 @@ def test_the_mirror_is_the_truth_after_the_flip_of_the_template(store: str) -> N
 def test_a_variant_is_computed_once(store: str, monkeypatch: pytest.MonkeyPatch) -> None:
     wanted = HumansSet.parse("remeshed_2000", store)
     first = wanted.load(NAME)
-    monkeypatch.setattr("csm.data.humans.remesh", None)
+    monkeypatch.setattr("csm.data.variants.remesh", None)
     assert wanted.load(NAME).mesh.digest == first.mesh.digest
 
 

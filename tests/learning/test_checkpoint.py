@@ -6,6 +6,7 @@ from pathlib import Path
 import lightning as L
 import pytest
 import torch
+from safetensors.torch import load_file
 
 from csm.errors import ConfigError, DataError
 from csm.learning.checkpoint import export_module, load_module
@@ -92,3 +93,13 @@ def test_what_is_no_checkpoint_is_named(tmp_path):
     torch.save({"state_dict": {}}, tmp_path / "a.ckpt")
     with pytest.raises(DataError, match=r"a\.ckpt: not a checkpoint"):
         load_module(tmp_path / "a.ckpt")
+
+
+def test_an_export_keeps_the_standardisation_and_leaves_the_other_classifiers_out(tmp_path):
+    torch.manual_seed(0)
+    hks = {"name": "hks", "k": 30, "n_times": 7, "scaled": True}
+    module = CSMModule(NETWORK, 7, 50, hks, basis_k=24, standardise=True, also_classes={"others": 60})
+    module.inputs.learn([3 + 5 * sample()[0]])
+    again = load_module(export_module(module, tmp_path))
+    torch.testing.assert_close(again.eval()(*sample()), module.eval()(*sample()), atol=0, rtol=0)
+    assert not any(name.startswith("others") for name in load_file(tmp_path / "model.safetensors"))

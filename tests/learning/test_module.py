@@ -8,7 +8,7 @@ import torch.nn.functional as F
 from csm.descriptors import Coordinates
 from csm.errors import ConfigError
 from csm.learning.loading import LightningData
-from csm.learning.module import random_rotation
+from csm.learning.module import Standardisation, random_rotation
 from csm.learning.samples import NetworkInput
 from csm.matching.nearest import nearest
 from tests.learning.toys import make, train
@@ -118,3 +118,24 @@ def test_the_same_seed_gives_the_same_network(loaded, tmp_path):
         train(module, loaded, tmp_path / str(run), 2, limit_val_batches=0)
         weights.append(module.network.embed.weight.detach().clone())
     torch.testing.assert_close(*weights)
+
+
+def test_standardised_inputs_have_mean_zero_and_deviation_one_over_the_shapes_whatever_their_sizes():
+    shapes = [torch.randn(n, 3) * torch.tensor([1.0, 50.0, 0.0]) + torch.tensor([5.0, 0.0, 7.0]) for n in (40, 4000)]
+    inputs = Standardisation(3)
+    inputs.learn(shapes)
+    moments = torch.stack([inputs(x).mean(0) for x in shapes]).mean(0)
+    spread = torch.stack([inputs(x).square().mean(0) for x in shapes]).mean(0)
+    torch.testing.assert_close(moments, torch.zeros(3), atol=1e-3, rtol=0)
+    torch.testing.assert_close(spread, torch.tensor([1.0, 1.0, 0.0]), atol=1e-3, rtol=0)
+    assert inputs(torch.full((1, 3), 1e9)).max() == 10
+
+
+def test_shapes_of_another_template_train_the_same_descriptor_through_a_classifier_of_their_own(loaded, tmp_path):
+    module = make(loaded, also_classes={"others": 50})
+    sample = next(iter(loaded.val_dataloader()))._replace(template="others")
+    sample = sample._replace(rows=sample.rows[:50], classes=torch.arange(50))
+    module.loss(module(sample.features, sample.surface), sample).backward()
+    assert module.classifier("others").weight.grad is not None
+    assert module.network.classifier.weight.grad is None
+    assert all(p.grad is not None for p in module.network.embed.parameters())

@@ -45,10 +45,10 @@ class Weighings(ConvolutionalNetwork):
 
 
 class Hooked(Weighings):
-    def lifted(self, x: Tensor) -> Tensor:
+    def lifted(self, x: Tensor, surface: Surface) -> Tensor:
         return x + 1
 
-    def activated(self, x: Tensor, layer: int) -> Tensor:
+    def activated(self, x: Tensor, layer: int, surface: Surface) -> Tensor:
         return x + 10 ** (layer + 1)
 
 

@@ -4,6 +4,7 @@ import pytest
 import torch
 
 from csm.networks import CSMCNN, Surface, build
+from csm.networks.csmcnn import VertexNorm
 from tests.networks.test_csmconv import basis_of
 from tests.shapes import blob
 
@@ -35,7 +36,7 @@ def basis():
     return basis_of(mesh, 24)
 
 
-@pytest.mark.parametrize("normalisation", ["batch", "instance", "none"])
+@pytest.mark.parametrize("normalisation", ["batch", "instance", "area", "none"])
 @pytest.mark.parametrize("activation", ["relu", "elu", "leaky_relu", "gelu"])
 def test_every_option_runs_and_learns(basis, normalisation, activation):
     torch.manual_seed(0)
@@ -61,11 +62,21 @@ def test_sign_flips_leave_the_network_unchanged(basis):
     torch.testing.assert_close(net.describe(x, Surface(flipped)), net.describe(x, Surface(basis)))
 
 
-def test_instance_normalisation_gives_each_channel_mean_zero_and_variance_one(basis):
-    net = CSMCNN(4, 30, ks=20, normalisation="instance").double()
-    y = net.finish[0][0](torch.randn(len(basis.mass), 64, dtype=torch.float64) * 5 + 3)
-    assert y.mean(0).abs().max() < 1e-9
-    torch.testing.assert_close(y.var(0, unbiased=False), torch.ones(64, dtype=torch.float64), atol=1e-5, rtol=0)
+@pytest.mark.parametrize("normalisation", ["instance", "area"])
+def test_normalisation_gives_each_channel_mean_zero_and_variance_one(basis, normalisation):
+    net = CSMCNN(4, 30, ks=20, normalisation=normalisation).double()
+    y = net.finish[0][0](torch.randn(len(basis.mass), 64, dtype=torch.float64) * 5 + 3, basis.mass)
+    share = (basis.mass if normalisation == "area" else torch.ones_like(basis.mass)) / 1.0
+    share = share / share.sum()
+    assert (share @ y).abs().max() < 1e-9
+    torch.testing.assert_close(share @ y.square(), torch.ones(64, dtype=torch.float64), atol=1e-5, rtol=0)
+
+
+def test_by_area_a_vertex_that_is_split_in_two_changes_nothing(basis):
+    norm = VertexNorm(3, 1e-5, by_area=True).double()
+    x = torch.randn(len(basis.mass), 3, dtype=torch.float64)
+    halved = torch.cat([basis.mass[:1] / 2, basis.mass[1:], basis.mass[:1] / 2])
+    torch.testing.assert_close(norm(torch.cat([x, x[:1]]), halved)[:-1], norm(x, basis.mass))
 
 
 def test_unknown_names_are_answered_with_the_known_ones():

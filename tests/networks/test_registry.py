@@ -96,7 +96,7 @@ def test_unknown_networks_and_models_are_answered_with_the_known_ones():
     for ask in (lambda: build("nope", 3, 4), lambda: stencils_of("nope")):
         with pytest.raises(ValueError, match=r"no network 'nope'; known are acscnn, .*csmcnn.*, splinecnn"):
             ask()
-    with pytest.raises(ValueError, match=r"no model 'nope'; known are .*add_mlp, .*csmcnn, csmcnn_paper"):
+    with pytest.raises(ValueError, match=r"no model 'nope'; known are .*add_mlp, .*csmcnn, csmcnn_own, csmcnn_paper"):
         settings("nope")
 
 

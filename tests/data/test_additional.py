@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from csm.data.additional import VariantSet, additional
+from csm.data.base import DataModule
+from csm.data.registry import recognise
+from csm.data.splits import Split
+from csm.data.store import Store
+from csm.descriptors import HKS
+from csm.errors import ConfigError
+from tests.toyset import write_toys
+
+SPLIT = Split("mine", ("toy0", "toy1"), ("toy4", "toy5"))
+
+
+@pytest.fixture(scope="module")
+def toys(tmp_path_factory):
+    return recognise(write_toys(tmp_path_factory.mktemp("also") / "toys"))
+
+
+def test_another_triangulation_keeps_the_places_of_the_template(toys, tmp_path):
+    shapes = VariantSet(toys, "remeshed", 300, str(tmp_path))
+    before, after = toys.load("toy0"), shapes.load("toy0")
+    assert shapes.name == f"{toys.name}_remeshed_300"
+    assert after.mesh.n_vertices != before.mesh.n_vertices
+    assert after.truth.n_from == before.truth.n_from
+    moved = np.linalg.norm(
+        after.mesh.vertices[after.truth.indices] - before.mesh.vertices[before.truth.indices], axis=1
+    )
+    assert moved.max() < 0.2 * np.ptp(before.mesh.vertices, axis=0).max()
+
+
+def test_the_same_shapes_share_a_template_and_humans_have_their_own(toys, tmp_path):
+    more = additional("refined_200", toys, SPLIT.train, Store(tmp_path))
+    assert (more.template, more.names) == ("", SPLIT.train)
+    humans = additional("humans_remeshed_5000", toys, SPLIT.train, Store(tmp_path))
+    assert (humans.template, len(humans.names), humans.shapes.name) == ("humans", 80, "humans_remeshed_5000")
+    assert additional("humans", toys, SPLIT.train, Store(tmp_path)).n_classes == 6899
+
+
+@pytest.mark.parametrize("text", ["faust", "remeshed", "remeshed_x", "humans_5000", "", "humans_bent_3"])
+def test_an_unknown_name_is_answered_with_the_forms(toys, tmp_path, text):
+    with pytest.raises(ConfigError, match=r"data.also: .* wanted remeshed_N"):
+        additional(text, toys, SPLIT.train, Store(tmp_path))
+
+
+def test_a_data_module_prepares_and_names_them(toys, tmp_path):
+    data = DataModule(
+        toys,
+        [toys],
+        SPLIT,
+        descriptor=HKS(k=6, n_times=3),
+        basis_k=8,
+        workers=0,
+        store=Store(tmp_path),
+        also=["remeshed_200"],
+    )
+    data.prepare()
+    assert f"2 shapes of {toys.name} and 2 shapes of {toys.name}_remeshed_200" in data.protocol
+    assert data.also_classes == {}
