@@ -161,10 +161,16 @@ def farthest_points(points: FloatArray, n: int) -> IntArray:
     chosen = np.empty(n, dtype=np.int64)
     distance = np.full(len(points), np.inf)
     at = int(((points - points.mean(0)) ** 2).sum(1).argmax())
+    axes = np.ascontiguousarray(points.T)
+    rest, away = np.empty((2, len(points)))  # squared distances along one axis, and along those so far
     for i in range(n):
         chosen[i] = at
-        rest = points - points[at]
-        np.minimum(distance, np.einsum("ij,ij->i", rest, rest), out=distance)
+        away[:] = 0
+        for axis in axes:
+            np.subtract(axis, axis[at], out=rest)
+            np.multiply(rest, rest, out=rest)
+            np.add(away, rest, out=away)
+        np.minimum(distance, away, out=distance)
         distance[at] = -1.0  # chosen once, also where others lie at the same place
         at = int(distance.argmax())
     return chosen
