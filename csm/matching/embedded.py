@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-import torch
 from scipy.spatial import cKDTree
-from torch import Tensor
 
 from csm._types import FloatArray, IntArray
 from csm.matching.orientation import spectral_turns
 from csm.mesh.debris import body_of
 from csm.mesh.shape import Mesh
 from csm.operators.spectrum import Spectrum
+
+if TYPE_CHECKING:
+    import torch
+    from torch import Tensor
 
 MOST = 200
 """Eigenfunctions that refinements use at most."""
@@ -127,6 +130,8 @@ class Embedded:
         return self._samples[n]
 
     def _tensor(self, values: FloatArray) -> Tensor:
+        import torch
+
         return torch.from_numpy(np.ascontiguousarray(values, dtype=np.float32)).to(self.device)
 
 
