@@ -13,7 +13,7 @@ from hydra import compose, initialize_config_dir
 from hydra.utils import get_class, instantiate
 from omegaconf import DictConfig, OmegaConf
 
-from csm.commands.app import config_folder
+from csm.commands.choices import config_folder
 from csm.commands.groups import FILLED_IN, GROUPS, make_protocol
 from csm.commands.main import COMMANDS
 from csm.data.registry import DATA_SETS

@@ -21,11 +21,11 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from csm._signals import exit_status, terminable
+from csm.commands.choices import config_folder
 from csm.commands.explain import explained
-from csm.commands.groups import config_folder
 from csm.commands.help import help_text
 from csm.commands.schema import require_valid
-from csm.commands.words import to_overrides
+from csm.commands.words import asks_for_help, to_overrides
 from csm.errors import ConfigError, CsmError
 from csm.evaluation.provenance import remember_command
 from csm.mesh.io import atomic_path
@@ -33,7 +33,6 @@ from csm.mesh.io import atomic_path
 Run = Callable[[DictConfig], dict[str, Any]]
 
 _NO_WORK = ("--cfg", "-c", "--info", "-i", "--hydra-help", "--version", "--shell-completion", "-sc")
-_HELP = ("--help", "-h")
 
 
 def output_folder() -> Path:
@@ -47,9 +46,7 @@ def write_json(path: Path, content: Any) -> None:
         temporary.write_text(json.dumps(content, indent=1, allow_nan=True) + "\n")
 
 
-def command(
-    config_name: str, *, folder: bool = False, more: Callable[[], str] = str
-) -> Callable[[Run], Callable[[], Any]]:
+def command(config_name: str, *, folder: bool = False) -> Callable[[Run], Callable[[], Any]]:
     """Turn ``run(cfg) -> dict of floats`` into a Hydra command.
 
     An error that the user can mend is printed as one paragraph and ends the process with status 2; with
@@ -62,8 +59,6 @@ def command(
         Name of its yaml, and of the command.
     folder
         Whether a job has a folder of its own, with ``result.json`` of what it returned.
-    more
-        Makes what its help says besides the options.
     """
 
     def decorate(run: Run) -> Callable[[], Any]:
@@ -76,8 +71,8 @@ def command(
 
         def entry() -> Any:
             arguments = sys.argv[1:]
-            if any(argument in _HELP for argument in arguments):
-                print(help_text(config_name, config_name, more()))
+            if asks_for_help(arguments):
+                print(help_text(config_name))
                 return None
             remember_command(sys.argv)
             with _errors_told(config_name, "debug=true" in arguments):

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from csm.commands.main import run_as_program
+
+if __name__ == "__main__":
+    run_as_program(__file__)
+
 from typing import Any
 
 from omegaconf import DictConfig
@@ -23,6 +28,3 @@ def run(cfg: DictConfig) -> dict[str, Any]:
 
 
 main = command("bench")(run)
-
-if __name__ == "__main__":
-    main()

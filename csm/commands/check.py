@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from csm.commands.main import run_as_program
+
+if __name__ == "__main__":
+    run_as_program(__file__)
+
 import os
 import textwrap
 from collections.abc import Sequence
@@ -172,6 +177,3 @@ def _what_is_missing(missing: Sequence[Missing]) -> list[str]:
 
 
 main = command("check")(run)
-
-if __name__ == "__main__":
-    main()

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from csm.commands.main import run_as_program
+
+if __name__ == "__main__":
+    run_as_program(__file__)
+
 from pathlib import Path
 from typing import Any
 
@@ -84,6 +89,3 @@ def report(done: Cleaned, source: Path, target: Path) -> None:
 
 
 main = command("clean")(run)
-
-if __name__ == "__main__":
-    main()

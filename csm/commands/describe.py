@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from csm.commands.main import run_as_program
+
+if __name__ == "__main__":
+    run_as_program(__file__)
+
 import json
 from pathlib import Path
 from typing import Any
@@ -65,6 +70,3 @@ def run(cfg: DictConfig) -> dict[str, Any]:
 
 
 main = command("describe")(run)
-
-if __name__ == "__main__":
-    main()

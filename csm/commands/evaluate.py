@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from csm.commands.main import run_as_program
+
+if __name__ == "__main__":
+    run_as_program(__file__)
+
 from typing import Any
 
 from omegaconf import DictConfig
@@ -30,6 +35,3 @@ def run(cfg: DictConfig) -> dict[str, Any]:
 
 
 main = command("evaluate", folder=True)(run)
-
-if __name__ == "__main__":
-    main()

@@ -19,7 +19,7 @@ from omegaconf.errors import (
     OmegaConfBaseException,
 )
 
-from csm.commands.groups import config_folder, options_of
+from csm.commands.choices import config_folder, options_of
 from csm.commands.words import nearest_names
 from csm.errors import CsmError
 

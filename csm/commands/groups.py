@@ -10,13 +10,13 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import fields
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hydra.core.config_store import ConfigStore
 from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
+from csm.commands.choices import model_names
 from csm.data.store import Store
 from csm.errors import ConfigError
 
@@ -27,20 +27,6 @@ if TYPE_CHECKING:
 
 FILLED_IN = ("self", "train_set", "test_sets", "descriptor", "store", "workers", "stencils", "options")
 """Arguments of data modules that commands give, so that they are no options."""
-
-
-def config_folder() -> Path:
-    """Return the folder of the Hydra groups: inside the installed package, or beside it in a checkout."""
-    package = Path(__file__).resolve().parent.parent
-    inside = package / "conf"
-    return inside if inside.is_dir() else package.parent / "conf"
-
-
-def options_of(group: str) -> list[str]:
-    """Return the names that can be chosen of a group: those from a registry, and those of yaml files."""
-    made = list(GROUPS[group]()) if group in GROUPS else []
-    files = sorted(path.stem for path in (config_folder() / group).glob("*.yaml"))
-    return list(dict.fromkeys([*made, *files]))
 
 
 def register(*groups: str) -> None:
@@ -68,9 +54,9 @@ def _descriptor_config(descriptor: Any) -> dict[str, Any]:
 
 def model_configs() -> dict[str, Mapping[str, Any]]:
     """Return the named settings of networks, and every network by its own name."""
-    from csm.networks import MODELS, NETWORKS, settings
+    from csm.networks import settings
 
-    return {name: settings(name) for name in {**MODELS, **NETWORKS}}
+    return {name: settings(name) for name in model_names()}
 
 
 def data_configs() -> dict[str, Mapping[str, Any]]:

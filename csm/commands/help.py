@@ -6,8 +6,9 @@ import re
 import textwrap
 from dataclasses import dataclass, field
 
-from csm.commands.groups import config_folder, options_of
+from csm.commands.choices import config_folder, options_of
 from csm.commands.words import LISTS, WORDS
+from csm.reproduction.registry import listing
 
 _OPTION = re.compile(r"(?P<key>\w+):\s*(?P<value>[^#]*?)\s*(?:#\s*(?P<words>.*))?")
 _ITEM = re.compile(
@@ -59,24 +60,14 @@ def _inherit(config_name: str, page: Page) -> None:
     page.groups += above.groups
 
 
-def help_text(command: str, config_name: str, more: str = "") -> str:
-    """Return the help of a command.
-
-    Parameters
-    ----------
-    command
-        Such as "match".
-    config_name
-        Name of its yaml.
-    more
-        What comes after the purpose, such as a list of studies.
-    """
-    page = read_page(config_name)
+def help_text(command: str) -> str:
+    """Return the help of a command, such as "match"; its yaml has the same name."""
+    page = read_page(command)
     own = sorted(page.options, key=lambda option: option[0] in {key for key, *_ in read_page("common").options})
     words = " ".join(f"[{key.upper()} ...]" if key in LISTS else key.upper() for key in WORDS.get(command, ()))
     lines = [f"usage: csm {command} {words} [key=value ...]".replace("  ", " "), ""]
     lines += [*textwrap.wrap(" ".join(page.purpose), _WIDTH), ""]
-    lines += [more, ""] if more else []
+    lines += ["studies:", listing(), ""] if command == "reproduce" else []
     lines += ["options, with their defaults:", *_table([(f"{key}={value}", text) for key, value, text in own])]
     for group, choice, _ in page.groups:
         if group.startswith("hydra"):

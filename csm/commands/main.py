@@ -1,13 +1,18 @@
-"""The `csm` program: one word chooses the command, the rest is Hydra's."""
+"""The `csm` program: one word chooses the command, the rest is Hydra's.
+
+Help is given before the module of a command is imported, which takes seconds.
+"""
 
 from __future__ import annotations
 
 import importlib
 import sys
+from pathlib import Path
+from typing import NoReturn
 
 from csm import __version__
 from csm._signals import exit_status, terminable
-from csm.commands.words import nearest_names
+from csm.commands.words import asks_for_help, nearest_names
 
 COMMANDS = {
     "train": "train a network on one set and test it on others",
@@ -48,9 +53,33 @@ def main() -> None:
         print(f"csm: there is no command {arguments[0]!r}{near}; csm --help lists them", file=sys.stderr)
         sys.exit(2)
     sys.argv = [f"csm {arguments[0]}", *arguments[1:]]
+    run_command(arguments[0])
+
+
+def run_as_program(module: str) -> NoReturn:
+    """Run a command as ``python -m csm.commands.NAME`` does, and end the process.
+
+    Its module calls this before it imports anything else, so that a Ctrl-C meanwhile ends in order.
+
+    Parameters
+    ----------
+    module
+        Name of the file of the command's module.
+    """
+    run_command(Path(module).stem)
+    sys.exit()
+
+
+def run_command(name: str) -> None:
+    """Run a command with the arguments of the process, or print its help."""
+    if asks_for_help(sys.argv[1:]):
+        from csm.commands.help import help_text
+
+        print(help_text(name))
+        return
     try:
         with terminable():
-            importlib.import_module(f"csm.commands.{arguments[0]}").main()
+            importlib.import_module(f"csm.commands.{name}").main()
     except KeyboardInterrupt as stop:  # while modules are loaded; later the command itself says what is kept
         print("csm: stopped before anything was done", file=sys.stderr)
         sys.exit(exit_status(stop))

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from csm.commands.main import run_as_program
+
+if __name__ == "__main__":
+    run_as_program(__file__)
+
 import time
 from pathlib import Path
 from typing import Any
@@ -82,6 +87,3 @@ def _method(cfg: DictConfig) -> tuple[Method, str]:
 
 
 main = command("match")(run)
-
-if __name__ == "__main__":
-    main()

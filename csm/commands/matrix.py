@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from csm.commands.main import run_as_program
+
+if __name__ == "__main__":
+    run_as_program(__file__)
+
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -87,6 +92,3 @@ def identity_of(cfg: DictConfig) -> dict[str, Any]:
 
 
 main = command("matrix", folder=True)(run)
-
-if __name__ == "__main__":
-    main()

@@ -15,7 +15,6 @@ from hydra.types import RunMode
 from numpy.typing import NDArray
 
 from csm.errors import ConfigError
-from csm.evaluation.report import read_rows
 from csm.mesh.io import file_digest
 
 _OVERWRITE = "give another out=, or overwrite=true to replace it"
@@ -90,6 +89,8 @@ def require_results(results: str | None) -> None:
     path = Path(results)
     require_file_place(path, "results")
     if path.exists():
+        from csm.evaluation.report import read_rows
+
         read_rows(path)
 
 

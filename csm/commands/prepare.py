@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from csm.commands.main import run_as_program
+
+if __name__ == "__main__":
+    run_as_program(__file__)
+
 import shutil
 from typing import Any
 
@@ -101,6 +106,3 @@ def _gigabytes(folder: Any) -> int:
 
 
 main = command("prepare")(run)
-
-if __name__ == "__main__":
-    main()

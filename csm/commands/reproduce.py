@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from csm.commands.main import run_as_program
+
+if __name__ == "__main__":
+    run_as_program(__file__)
+
 import time
 from collections.abc import Sequence
 from functools import partial
@@ -83,7 +88,4 @@ def conclude(findings: Findings, out: Path, results: str | None, seconds: float)
     print(f"\n{findings.markdown()}\n\nin {seconds:.0f} s: {', '.join(str(path) for path in files)}", flush=True)
 
 
-main = command("reproduce", more=lambda: f"studies:\n{listing()}")(run)
-
-if __name__ == "__main__":
-    main()
+main = command("reproduce")(run)

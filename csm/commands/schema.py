@@ -158,7 +158,7 @@ def _require_network(node: Mapping[str, Any]) -> None:
     if name not in NETWORKS:
         near = nearest_names(str(name), NETWORKS)
         raise ConfigError(f"model.name={_shown(name)}: there is no such network{near}; there are {', '.join(NETWORKS)}")
-    _require_options("model", {key: value for key, value in node.items() if key != "name"}, NETWORKS[name])
+    _require_options("model", {key: value for key, value in node.items() if key != "name"}, NETWORKS[str(name)])
 
 
 def _require_options(group: str, given: Mapping[str, Any], cls: Callable[..., Any]) -> None:

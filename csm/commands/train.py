@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from csm.commands.main import run_as_program
+
+if __name__ == "__main__":
+    run_as_program(__file__)
+
 from collections.abc import Sequence
 from typing import Any
 
@@ -107,6 +112,3 @@ def conclude(cfg: DictConfig, tested: list[Tested], notes: str) -> None:
 
 
 main = command("train", folder=True)(run)
-
-if __name__ == "__main__":
-    main()

@@ -46,6 +46,11 @@ _WITH_VALUE = {
 _KEY = re.compile(r"[+~]{0,2}[A-Za-z_][\w./@:-]*")
 
 
+def asks_for_help(arguments: Sequence[str]) -> bool:
+    """Tell whether the arguments of a command ask for its help, whatever else they say."""
+    return "--help" in arguments or "-h" in arguments
+
+
 def to_overrides(command: str, arguments: Sequence[str]) -> list[str]:
     """Return the arguments of a command as Hydra takes them.
 
@@ -121,7 +126,7 @@ def _named(command: str, words: Sequence[str]) -> list[str]:
 
 
 def _meant(word: str) -> str:
-    from csm.commands.groups import options_of
+    from csm.commands.choices import options_of
 
     for group in ("experiment", "descriptor", "model", "data", "recipe"):
         if word in options_of(group):
@@ -186,7 +191,7 @@ def without_null(argument: str) -> str:
     >>> without_null("logger=null"), without_null("resume=null")
     ('logger=none', 'resume=null')
     """
-    from csm.commands.groups import config_folder
+    from csm.commands.choices import config_folder
 
     group, equals, value = argument.partition("=")
     has_none = group.isidentifier() and (config_folder() / group / "none.yaml").is_file()

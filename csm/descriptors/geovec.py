@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from csm._types import FloatArray
 
@@ -14,6 +13,8 @@ def spline_weights(evals: FloatArray, n: int, step: float, *, shift: float = 0.0
     B is the uniform cubic B-spline on [0, 4], greatest (2/3) at 2; inside the range of knots the columns sum to 1.
     With `shift` 0, spline i begins at i steps; with 2 it is centred there.
     """
+    from scipy.interpolate import BSpline  # here, since it takes longer to import than all descriptors together
+
     x = evals[:, None] / step - np.arange(n) + shift
     bump = BSpline.basis_element(np.arange(5.0))
     weights: FloatArray = np.where((x > 0) & (x < 4), bump(np.clip(x, 0.0, 4.0)), 0.0)

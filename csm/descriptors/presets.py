@@ -7,12 +7,14 @@ A new family needs a file with its class in this folder, and one line here.  `fr
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from typing import Any
+from functools import cache, partial
+from typing import TYPE_CHECKING, Any
 
-from csm._places import load
-from csm.descriptors.base import Descriptor
-from csm.descriptors.stack import Stack
+from csm._places import Loaded, load
 from csm.errors import ConfigError
+
+if TYPE_CHECKING:
+    from csm.descriptors.base import Descriptor
 
 SETTINGS: dict[str, tuple[str, dict[str, Any]]] = {
     "acd": ("acd:ACD", {}),
@@ -44,13 +46,48 @@ SETTINGS: dict[str, tuple[str, dict[str, Any]]] = {
 "acd_release_frame" reproduces the authors' output with their frame, which depends on the world's axes.
 """
 
-PRESETS: dict[str, Descriptor] = {
-    name: load(f"csm.descriptors.{place}")(**changes) for name, (place, changes) in SETTINGS.items()
-}
+
+def _made(name: str) -> Descriptor:
+    place, changes = SETTINGS[name]
+    found: Descriptor = load(f"csm.descriptors.{place}")(**changes)
+    return found
+
+
+PRESETS: Loaded[Descriptor] = Loaded({name: partial(_made, name) for name in SETTINGS})
 """The named settings as descriptors."""
 
-FAMILIES: dict[str, type[Descriptor]] = {each.name: type(each) for each in PRESETS.values()} | {Stack.name: Stack}
-"""The classes of descriptors by `Descriptor.name`."""
+if TYPE_CHECKING:
+    FAMILIES: dict[str, type[Descriptor]]
+    """The classes of descriptors by `Descriptor.name`."""
+
+
+def __getattr__(name: str) -> Any:
+    if name == "FAMILIES":
+        return families()
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+@cache
+def families() -> dict[str, type[Descriptor]]:
+    """Return the classes of descriptors by `Descriptor.name`, which is also `FAMILIES`; all of them are imported."""
+    classes_ = [*(type(each) for each in PRESETS.values()), load("csm.descriptors.stack:Stack")]
+    return {each.name: each for each in classes_}
+
+
+def classes() -> dict[str, tuple[str, ...]]:
+    """Return the modules of the families, each with the names of its classes, without importing them.
+
+    Examples
+    --------
+    >>> classes()["csm.descriptors.acd"]
+    ('ACD',)
+    """
+    found: dict[str, tuple[str, ...]] = {}
+    for place, _ in SETTINGS.values():
+        module, _, name = place.partition(":")
+        known = found.get(f"csm.descriptors.{module}", ())
+        found[f"csm.descriptors.{module}"] = tuple(dict.fromkeys((*known, name.partition(".")[0])))
+    return found
 
 
 def preset(name: str, **overrides: Any) -> Descriptor:
@@ -115,9 +152,9 @@ def from_parameters(name: str, *, version: int = 1, **parameters: Any) -> Descri
     >>> from_parameters("hks", **preset("hks", n_times=16).parameters()) == preset("hks", n_times=16)
     True
     """
-    if name not in FAMILIES:
-        raise ConfigError(f"there is no descriptor family {name!r}; there are {', '.join(FAMILIES)}")
-    family = FAMILIES[name]
+    if name not in families():
+        raise ConfigError(f"there is no descriptor family {name!r}; there are {', '.join(families())}")
+    family = families()[name]
     if version != family.version:
         raise ConfigError(
             f"descriptor {name}: the record is of version {version}, but this csm computes version {family.version}; "
@@ -132,6 +169,6 @@ def from_parameters(name: str, *, version: int = 1, **parameters: Any) -> Descri
             f"{', '.join(known) or 'none'} (unknown: {', '.join(unknown) or 'none'}; "
             f"missing: {', '.join(missing) or 'none'})"
         )
-    if family is Stack:
+    if name == "stack":
         given = {"parts": {key: from_parameters(**part) for key, part in given["parts"].items()}}
     return family(**given)

@@ -86,7 +86,7 @@ class Memory:
 
         def size(described: Described) -> int:
             per_vertex = _BYTES_PER_EIGENFUNCTION * MOST if refined else 0
-            return described.features.nbytes + per_vertex * described.mesh.n_vertices
+            return described.rows.nbytes + per_vertex * described.mesh.n_vertices
 
         self.shape = Recent(load, lambda shape: _BYTES_PER_VERTEX * shape.mesh.n_vertices, limit)
         self.described = Recent(describe, size, limit)

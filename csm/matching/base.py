@@ -6,21 +6,25 @@ import re
 from abc import ABC, abstractmethod
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-import torch
-from torch import Tensor
+import numpy as np
+from numpy.typing import NDArray
 
-from csm._types import IntArray
+from csm._types import Float32Array, IntArray
 from csm.data.prepare import Recipe, shared_operators
 from csm.data.store import Store
 from csm.descriptors.constant import Constant
 from csm.errors import ConfigError
 from csm.matching.embedded import Embedded, n_eigenfunctions, spread_vertices
 from csm.matching.maps import VertexMap
+from csm.matching.rows import as_array, is_tensor
 from csm.mesh.debris import unit_area
 from csm.mesh.shape import Mesh
 from csm.operators import Spectrum
+
+if TYPE_CHECKING:
+    from torch import Tensor
 
 
 class Classifier(NamedTuple):
@@ -63,6 +67,8 @@ def votes(features: Tensor, classifier: Classifier, *, block: int = 1024) -> Vot
     ConfigError
         If a number is not finite.
     """
+    import torch
+
     weight, bias = (tensor.to(features.device) for tensor in classifier)
     if not torch.isfinite(features).all():
         raise ConfigError("argmax: a descriptor is not finite, so no class is the most probable; look at the features")
@@ -92,6 +98,10 @@ def require_device(device: str) -> str:
     >>> require_device("cpu")
     'cpu'
     """
+    if device == "cpu":
+        return device
+    import torch
+
     try:
         torch.zeros(1, device=device).item()  # a device without numbers, such as "meta", is of no use
     except (RuntimeError, AssertionError, NotImplementedError) as error:
@@ -109,8 +119,8 @@ class Described:
     ----------
     mesh
         The shape, at the scale it was given.
-    features
-        Shape (N, Q), one row per vertex; matching runs on the device that it is on.
+    rows
+        Shape (N, Q), the features of the vertices: a tensor, or an array, with which matching runs on the processor.
     classifier
         Over the template points, if the method is a network that has one.
     store
@@ -120,13 +130,25 @@ class Described:
     """
 
     mesh: Mesh
-    features: Tensor
+    rows: NDArray[Any] | Tensor
     classifier: Classifier | None = None
     store: Store | None = None
     given: Tensor | None = None
 
     def __repr__(self) -> str:
-        return f"Described({self.mesh!r}, {self.features.shape[1]} features)"
+        return f"Described({self.mesh!r}, {self.rows.shape[1]} features)"
+
+    @cached_property
+    def features(self) -> Tensor:
+        """The rows as a tensor, on the device where matching runs."""
+        import torch
+
+        return torch.as_tensor(self.rows)
+
+    @cached_property
+    def values(self) -> Float32Array:
+        """The rows as an array of float32."""
+        return as_array(self.rows).astype(np.float32, copy=False)
 
     @cached_property
     def votes(self) -> Votes:
@@ -147,7 +169,8 @@ class Described:
     def embedded(self) -> Embedded:
         """The mesh at unit area with its eigenfunctions, as refinements compute with them."""
         spectrum = self.spectrum(n_eigenfunctions(self.mesh))
-        return Embedded(unit_area(self.mesh), spectrum, self.features.device, self.order)
+        device = self.rows.device if is_tensor(self.rows) else "cpu"
+        return Embedded(unit_area(self.mesh), spectrum, device, self.order)
 
     @cached_property
     def order(self) -> IntArray:

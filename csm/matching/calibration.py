@@ -14,7 +14,6 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
 from scipy.special import expit
 
 from csm._types import BoolArray, FloatArray
@@ -78,6 +77,8 @@ def fit_calibration(
     >>> bool(found.probability(x)[0] > 0.9 > 0.1 > found.probability(x)[-1])
     True
     """
+    from scipy.optimize import minimize  # here, since it takes longer to import than a calibration to apply
+
     rows, y = _transformed(signals, tuple(names)), right.astype(np.float64)
     share = np.full(len(y), 1 / len(y)) if weights is None else weights / weights.sum()
     centre, scale = rows.mean(0), np.maximum(rows.std(0), 1e-9)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from torch import Tensor
+from numpy.typing import NDArray
 
 from csm._types import FloatArray, IntArray
 from csm.matching.calibration import Calibration, calibration
@@ -14,6 +15,9 @@ from csm.matching.nearest import nearest
 from csm.matching.signals import NEAR, OF_MAPS, Sides, map_signals, spectral_signals
 from csm.mesh.debris import body_of
 from csm.mesh.shape import Mesh
+
+if TYPE_CHECKING:
+    from torch import Tensor
 
 TRUSTED = 0.5
 """Confidence from which a partner counts as trustworthy: it is more probably right than not."""
@@ -148,7 +152,7 @@ def there_and_back(forward: VertexMap, backward: VertexMap, source: Mesh) -> Flo
     return np.where(back >= 0, away, np.inf)
 
 
-def share_returning(source: Mesh, at: IntArray, here: Tensor, there: Tensor) -> float:
+def share_returning(source: Mesh, at: IntArray, here: NDArray[Any] | Tensor, there: NDArray[Any] | Tensor) -> float:
     """Return how many nearest neighbours return to within `NEAR` on the way there and back, by descriptors alone.
 
     Parameters

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-import torch
 from scipy.spatial import cKDTree
-from torch import Tensor
 
 from csm._types import FloatArray, IntArray
 from csm.matching.orientation import spectral_turns
 from csm.mesh.debris import body_of
 from csm.mesh.shape import Mesh
 from csm.operators.spectrum import Spectrum
+
+if TYPE_CHECKING:
+    import torch
+    from torch import Tensor
 
 MOST = 200
 """Eigenfunctions that refinements use at most."""
@@ -127,6 +130,8 @@ class Embedded:
         return self._samples[n]
 
     def _tensor(self, values: FloatArray) -> Tensor:
+        import torch
+
         return torch.from_numpy(np.ascontiguousarray(values, dtype=np.float32)).to(self.device)
 
 
@@ -161,10 +166,16 @@ def farthest_points(points: FloatArray, n: int) -> IntArray:
     chosen = np.empty(n, dtype=np.int64)
     distance = np.full(len(points), np.inf)
     at = int(((points - points.mean(0)) ** 2).sum(1).argmax())
+    axes = np.ascontiguousarray(points.T)
+    rest, away = np.empty((2, len(points)))  # squared distances along one axis, and along those so far
     for i in range(n):
         chosen[i] = at
-        rest = points - points[at]
-        np.minimum(distance, np.einsum("ij,ij->i", rest, rest), out=distance)
+        away[:] = 0
+        for axis in axes:
+            np.subtract(axis, axis[at], out=rest)
+            np.multiply(rest, rest, out=rest)
+            np.add(away, rest, out=away)
+        np.minimum(distance, away, out=distance)
         distance[at] = -1.0  # chosen once, also where others lie at the same place
         at = int(distance.argmax())
     return chosen

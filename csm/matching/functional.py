@@ -16,7 +16,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 
 from csm._types import FloatArray, IntArray
 from csm.errors import ConfigError
@@ -142,7 +141,11 @@ def vertex_map(
     k, k_target = matrix.shape
     phi, psi = source.first(k).evecs, target.first(k_target).evecs
     queries, candidates = (phi, psi @ matrix.T) if adjoint else (phi @ matrix, psi)
-    return nearest(_rows(queries, device), _rows(candidates, device))
+    if device == "cpu":
+        return nearest(queries, candidates)
+    import torch
+
+    return nearest(torch.as_tensor(queries, device=device), torch.as_tensor(candidates, device=device))
 
 
 def orthogonal(matrices: FloatArray) -> FloatArray:
@@ -157,7 +160,3 @@ def orthogonal(matrices: FloatArray) -> FloatArray:
     u, _, v = np.linalg.svd(matrices, full_matrices=False)
     factors: FloatArray = u @ v
     return factors
-
-
-def _rows(values: FloatArray, device: str) -> torch.Tensor:
-    return torch.from_numpy(np.ascontiguousarray(values)).to(device)

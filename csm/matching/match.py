@@ -15,10 +15,11 @@ from csm.matching.both import BothWays, match_both_ways
 from csm.matching.confidence import share_returning
 from csm.matching.maps import VertexMap
 from csm.matching.methods import DescriptorMethod, Method, PrecomputedMethod, as_method
-from csm.matching.nearest import Rows, nearest
+from csm.matching.nearest import nearest
 from csm.matching.refinement.base import Refined, Refiner
 from csm.matching.registry import matchers as as_matchers
 from csm.matching.result import Match
+from csm.matching.rows import Rows
 from csm.matching.signals import SAMPLES
 from csm.matching.subjects import Cleaning, Subject, on_given, subject_of
 from csm.mesh.debris import body_of
@@ -128,7 +129,7 @@ def _against_input(here: Described, there: Described) -> list[str]:
     if here.given is None or there.given is None:
         return []
     tried = here.order[:SAMPLES]
-    learned = share_returning(here.mesh, tried, here.features, there.features)
+    learned = share_returning(here.mesh, tried, here.rows, there.rows)
     plain = share_returning(here.mesh, tried, here.given, there.given)
     if plain < learned + _CLEARLY:
         return []
@@ -141,7 +142,7 @@ def _against_input(here: Described, there: Described) -> list[str]:
 
 def _on_given_rows(described: Described, subject: Subject) -> Float32Array:
     """Return the features of a cleaned mesh at the given vertices, zero for those that were left out."""
-    rows, at = described.features.float().cpu().numpy(), subject.cleaned.vertex_map
+    rows, at = described.values, subject.cleaned.vertex_map
     return np.where(at[:, None] >= 0, rows[at], np.float32(0))
 
 

@@ -10,10 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
-
-import torch
-from torch import Tensor
+from typing import TYPE_CHECKING, Any
 
 from csm._types import FloatArray
 from csm.data.prepare import Recipe, features_of
@@ -23,6 +20,9 @@ from csm.descriptors.presets import preset
 from csm.errors import ConfigError
 from csm.matching.base import Described
 from csm.mesh.shape import Mesh
+
+if TYPE_CHECKING:
+    from torch import Tensor
 
 
 class Method(ABC):
@@ -86,8 +86,12 @@ class DescriptorMethod(Method):
 
     def describe(self, mesh: Mesh, store: Store, device: str = "cpu") -> Described:
         """Return the descriptor of a mesh, from the store or computed and kept."""
-        features = torch.as_tensor(features_of(mesh, self.descriptor, store)).to(device)
-        return Described(mesh, features, store=store)
+        features = features_of(mesh, self.descriptor, store)
+        if device == "cpu":
+            return Described(mesh, features, store=store)
+        import torch
+
+        return Described(mesh, torch.as_tensor(features).to(device), store=store)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +115,8 @@ class PrecomputedMethod(Method):
     @cached_property
     def key(self) -> Mapping[str, Any]:
         """The hash of all features."""
+        import torch
+
         digest = hashlib.sha256()
         for name, tensor in sorted(self.features.items()):
             plain = torch.as_tensor(tensor).detach().cpu().contiguous()
@@ -133,6 +139,8 @@ class PrecomputedMethod(Method):
                 f"{self.name}: {mesh.name} has {mesh.n_vertices} vertices, its features {len(found)} rows; wanted one "
                 "row per vertex"
             )
+        import torch
+
         return Described(mesh, torch.as_tensor(found).to(device), store=store)
 
 

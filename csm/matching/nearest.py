@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from csm._types import IntArray
-from csm.descriptors.base import Features
 from csm.errors import ConfigError
 from csm.matching.base import Described, Matcher
 from csm.matching.maps import VertexMap
+from csm.matching.rows import Rows, as_array, is_tensor
 
-Rows: TypeAlias = NDArray[Any] | torch.Tensor | Features
 _MAX_ELEMENTS = 2**25  # of one block of distances: 128 MiB in float32
 
 
@@ -27,7 +25,7 @@ class Nearest(Matcher):
 
     def __call__(self, source: Described, target: Described, at: IntArray | None = None) -> VertexMap:
         """Return the nearest neighbours, on the device of the features."""
-        indices = nearest(source.features, target.features, at=at)
+        indices = nearest(source.rows, target.rows, at=at)
         return VertexMap(indices, target.mesh.n_vertices, source.mesh.name, target.mesh.name)
 
 
@@ -65,51 +63,78 @@ def nearest(queries: Rows, candidates: Rows, *, at: IntArray | None = None, bloc
     >>> nearest(np.array([[0.9, 0.0], [0.0, 0.2]]), np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.0]]))
     array([1, 0])
     """
-    q, c = _tensor(queries), _tensor(candidates)
-    if q.ndim != 2 or c.ndim != 2 or q.shape[1] != c.shape[1] or len(c) == 0:
-        raise ConfigError(f"nearest: {tuple(q.shape)} against {tuple(c.shape)}; wanted (N, Q) and (N', Q) with N' > 0")
+    device = next((str(rows.device) for rows in (queries, candidates) if is_tensor(rows)), "cpu")
+    if device != "cpu":
+        return _on(device, queries, candidates, at, block)
+    q, c = as_array(queries), as_array(candidates)
+    _require_comparable(q.shape, c.shape)
     if at is not None:
         found = np.full(len(q), -1, dtype=np.int64)
-        found[at] = nearest(q[torch.as_tensor(at, device=q.device)], c, block=block)
+        found[at] = nearest(q[at], c, block=block)
         return found
     if q.dtype != c.dtype:
+        q, c = q.astype(np.float64), c.astype(np.float64)
+    _require_finite(bool(np.isfinite(q).all() and np.isfinite(c).all()))
+    return _search(q, c, c.mean(0), max(1, min(block, _MAX_ELEMENTS // len(c))))
+
+
+def _require_comparable(q: tuple[int, ...], c: tuple[int, ...]) -> None:
+    if len(q) != 2 or len(c) != 2 or q[1] != c[1] or c[0] == 0:
+        raise ConfigError(f"nearest: {tuple(q)} against {tuple(c)}; wanted (N, Q) and (N', Q) with N' > 0")
+
+
+def _require_finite(finite: bool) -> None:
+    if not finite:
+        raise ConfigError("nearest: a descriptor is not finite, so it has no nearest neighbour; look at the features")
+
+
+def _search(q: NDArray[Any], c: NDArray[Any], centre: NDArray[Any], block: int) -> IntArray:
+    """Return the first candidate within rounding of the nearest; float32 asks float64 which one that is."""
+    near_q, near_c = q - centre, c - centre
+    half_norms = 0.5 * np.einsum("ij,ij->i", near_c, near_c)
+    largest = np.sqrt(half_norms.max())
+    rounding = 4.0 * np.sqrt(c.shape[1]) * np.finfo(c.dtype).eps * largest
+    limits = rounding * (np.linalg.norm(near_q, axis=1) + largest)
+    first = np.empty(len(q), dtype=np.int64)
+    scores = np.empty((min(block, len(q)), len(c)), dtype=c.dtype)  # one piece of memory that stays in the cache
+    for begin in range(0, len(q), block):
+        part = near_q[begin : begin + block]
+        score = scores[: len(part)]
+        np.matmul(part, near_c.T, out=score)
+        np.subtract(half_norms, score, out=score)  # half the squared distance, less |q|^2 / 2
+        first[begin : begin + block] = score.argmin(1)
+        near = score <= (score.min(1) + limits[begin : begin + block])[:, None]
+        unsure = np.flatnonzero(np.count_nonzero(near, axis=1) > 1)
+        if len(unsure):
+            first[begin + unsure] = _first_of(near[unsure], q[begin + unsure], c, centre, block)
+    return first
+
+
+def _first_of(near: NDArray[np.bool_], q: NDArray[Any], c: NDArray[Any], centre: NDArray[Any], block: int) -> IntArray:
+    """Return the first of the nearest among the candidates that rounding cannot tell apart."""
+    if c.dtype == np.float64:
+        first: IntArray = near.argmax(1)
+        return first
+    columns = np.flatnonzero(near.any(0))
+    return columns[_search(q.astype(np.float64), c[columns].astype(np.float64), centre, block)]
+
+
+def _on(device: str, queries: Rows, candidates: Rows, at: IntArray | None, block: int) -> IntArray:
+    """Do what `nearest` does on a device other than the processor."""
+    import torch
+
+    from csm.matching._on_device import search
+
+    q, c = (
+        rows if is_tensor(rows) else torch.as_tensor(np.asarray(rows), device=device) for rows in (queries, candidates)
+    )
+    q, c = (rows if rows.dtype in (torch.float32, torch.float64) else rows.float() for rows in (q.detach(), c.detach()))
+    _require_comparable(tuple(q.shape), tuple(c.shape))
+    found = np.full(len(q), -1, dtype=np.int64)
+    asked = np.arange(len(q)) if at is None else at
+    q = q[torch.as_tensor(asked, device=q.device)]
+    if q.dtype != c.dtype:
         q, c = q.double(), c.double()
-    with torch.no_grad():
-        if not (torch.isfinite(q).all() and torch.isfinite(c).all()):
-            raise ConfigError(
-                "nearest: a descriptor is not finite, so it has no nearest neighbour; look at the features"
-            )
-        centre = c.mean(0)
-        first, unsure = _search(q - centre, c - centre, block)
-        if c.dtype != torch.float64 and unsure.any():
-            first[unsure] = _search(q[unsure].double() - centre, c.double() - centre, block)[0]
-    return first.cpu().numpy()
-
-
-def _tensor(rows: Rows) -> torch.Tensor:
-    tensor = rows.detach() if isinstance(rows, torch.Tensor) else torch.as_tensor(np.asarray(rows))
-    return tensor if tensor.dtype in (torch.float32, torch.float64) else tensor.float()
-
-
-def _search(q: torch.Tensor, c: torch.Tensor, block: int) -> tuple[torch.Tensor, torch.Tensor]:
-    """Return the first candidate within rounding of the nearest, and whether there are others."""
-    rows = max(1, min(block, len(q), _MAX_ELEMENTS // len(c)))
-    half_norms = 0.5 * c.square().sum(1)
-    largest = half_norms.max().sqrt()
-    rounding = 4.0 * c.shape[1] ** 0.5 * torch.finfo(c.dtype).eps * largest * (q.norm(dim=1) + largest)
-    first = torch.empty(len(q), dtype=torch.int64, device=q.device)
-    several = torch.empty(len(q), dtype=torch.bool, device=q.device)
-    scores = torch.empty(rows, len(c), dtype=c.dtype, device=c.device)  # one piece of memory that stays in the cache
-    for begin in range(0, len(q), rows):
-        here = slice(begin, begin + rows)
-        part = q[here]
-        # Half the squared distance, less |q|^2 / 2.
-        score = torch.addmm(half_norms, part, c.T, alpha=-1.0, out=scores[: len(part)])
-        least, first[here] = score.min(1)
-        limit = least + rounding[here]
-        score.scatter_(1, first[here, None], torch.inf)
-        several[here] = score.amin(1) <= limit
-        tied = several[here].nonzero()[:, 0]
-        others = (score[tied] <= limit[tied, None]).to(torch.uint8).argmax(1)
-        first[begin + tied] = torch.minimum(first[begin + tied], others)
-    return first, several
+    _require_finite(bool(torch.isfinite(q).all() and torch.isfinite(c).all()))
+    found[asked] = search(q, c, max(1, min(block, _MAX_ELEMENTS // len(c))))
+    return found

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
-from csm._places import load
+from csm._places import Loaded, load
 from csm.errors import ConfigError
 from csm.matching.base import Matcher
 from csm.matching.refinement.base import Refined, Refiner
@@ -16,7 +17,9 @@ PLACES = {
 }
 """Name -> file and class, whose parameters have defaults.  A new matcher is one file and one line here."""
 
-MATCHERS: dict[str, type[Matcher]] = {name: load(f"csm.matching.{place}") for name, place in PLACES.items()}
+MATCHERS: Loaded[type[Matcher]] = Loaded(
+    {name: partial(load, f"csm.matching.{place}") for name, place in PLACES.items()}
+)
 """The classes by name."""
 
 

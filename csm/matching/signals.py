@@ -8,17 +8,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
-from torch import Tensor
 
 from csm._types import FloatArray, IntArray
 from csm.matching.base import Described
 from csm.matching.embedded import Embedded
 from csm.matching.functional import functional_map
-from csm.matching.judging import judged
 from csm.matching.maps import VertexMap
+from csm.matching.rows import as_array
 from csm.mesh.debris import body_of
 from csm.mesh.shape import Mesh
 
@@ -122,11 +120,11 @@ class _Around:
 
 def _descriptor_gaps(sides: Sides) -> FloatArray:
     """Return the distance of each vertex's descriptor from its partner's, over the spread of the target's."""
-    here, there = sides.source.features, sides.target.features
-    spread = (there - there.mean(0)).square().sum(1).mean().sqrt()
-    partners = torch.from_numpy(sides.forward.indices).to(there.device)
-    gaps: Tensor = (here - there[partners]).norm(dim=1) / torch.clamp(spread, min=torch.finfo(there.dtype).tiny)
-    return gaps.double().cpu().numpy()
+    here, there = as_array(sides.source.rows), as_array(sides.target.rows)
+    spread = np.sqrt(((there - there.mean(0)) ** 2).sum(1).mean())
+    gaps = np.linalg.norm(here - there[sides.forward.indices], axis=1)
+    found: FloatArray = gaps.astype(np.float64) / max(float(spread), float(np.finfo(np.float32).tiny))
+    return found
 
 
 def _biharmonic_changes(source: Embedded, target: Embedded, there: IntArray) -> FloatArray:
@@ -147,6 +145,10 @@ def _biharmonic(shape: Embedded) -> FloatArray:
 
 def _judged(sides: Sides) -> tuple[float, float]:
     """Return how much the functional map of the map stretches areas, and how little it commutes with the Laplacians."""
+    import torch
+
+    from csm.matching.judging import judged
+
     here, there = sides.source.embedded.spectrum, sides.target.embedded.spectrum
     k = min(_JUDGED, len(here.evals), len(there.evals))
     c = torch.from_numpy(functional_map(sides.forward.indices, here, there, k))

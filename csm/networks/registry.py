@@ -6,12 +6,13 @@ The default of an option stands in the constructor of its network and nowhere el
 from __future__ import annotations
 
 import inspect
-from typing import Any
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
-import torch
+from csm._places import Loaded, load
 
-from csm._places import load
-from csm.networks.base import CorrespondenceNetwork
+if TYPE_CHECKING:
+    from csm.networks.base import CorrespondenceNetwork
 
 PLACES = {
     "acscnn": "acscnn:ACSCNN",
@@ -25,9 +26,9 @@ PLACES = {
 }
 """Name -> file and class.  A new network is one file and one line here."""
 
-NETWORKS: dict[str, type[CorrespondenceNetwork]] = {
-    name: load(f"csm.networks.{place}") for name, place in PLACES.items()
-}
+NETWORKS: Loaded[type[CorrespondenceNetwork]] = Loaded(
+    {name: partial(load, f"csm.networks.{place}") for name, place in PLACES.items()}
+)
 """The classes by name."""
 
 MODELS: dict[str, dict[str, Any]] = {
@@ -122,6 +123,8 @@ def stencils_of(name: str, **options: Any) -> dict[str, dict[str, Any]]:
     >>> stencils_of("splinecnn", kernel=3)
     {'edge_splines': {'kernel': 3}}
     """
+    import torch
+
     with torch.device("meta"):
         return build(name, 1, 1, **options).stencils()
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from html import escape
 
-from csm.viewer.scene import Panel, Viewer, ramp, scene_json
+from csm.viewer.colors import ramp
+from csm.viewer.scene import Panel, Viewer, scene_json
 
 MODES = {
     "matched": "Colours",

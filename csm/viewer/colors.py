@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Literal, TypeAlias
 
 import numpy as np
-from matplotlib import colormaps
 from numpy.typing import ArrayLike, NDArray
 
 from csm._types import FloatArray, IntArray
@@ -18,6 +17,18 @@ Colors: TypeAlias = NDArray[np.uint8]
 
 UNMATCHED = (168, 168, 168)
 ERROR_COLORMAP = "YlOrRd"
+
+RAMPS = {
+    "confidence": "00224d 003070 2a3f6d 434e6b 575d6d 696b71 7c7b78 908b77 a59b73 bbad6c d2bf60 e9d24d fde737",
+    "errors": "ffffcc ffeda0 fed976 feb24c fd8d3c fc4e2a e31a1c bd0026 800026",
+    "distance": "081d58 253494 225ea8 1d91c0 41b6c4 7fcdbb c7e9b4 edf8b1 ffffd9",
+}
+"""Stops of the colours of numbers on pages, all monotone in lightness, so that they need no colour vision.
+
+Confidence has those of cividis (Nunez, Anderton and Renslow 2018), the others have those of YlOrRd and YlGnBu of
+ColorBrewer (Harrower and Brewer 2003).
+"""
+
 _BINS = 32
 _GREY: Colors = np.array(UNMATCHED, dtype=np.uint8)
 
@@ -76,6 +87,8 @@ def scalar_colors(
     ConfigError
         If there is no such colour map.
     """
+    from matplotlib import colormaps
+
     if colormap not in colormaps:
         raise ConfigError(f"{colormap!r} is not a colour map of matplotlib; try viridis, cividis or {ERROR_COLORMAP}")
     given = np.asarray(values, dtype=np.float64)
@@ -85,6 +98,22 @@ def scalar_colors(
     fraction = np.clip((np.where(finite, given, first) - first) / max(last - first, 1e-300), 0, 1)
     colors: Colors = colormaps[colormap](fraction, bytes=True)[:, :3]
     return np.where(finite[:, None], colors, _GREY)
+
+
+def ramp(name: str, shades: int) -> Colors:
+    """Return the colours of one of the `RAMPS` from its first to its last, shape (shades, 3); matplotlib is not needed.
+
+    Examples
+    --------
+    >>> ramp("errors", 2)
+    array([[255, 255, 204],
+           [128,   0,  38]], dtype=uint8)
+    """
+    stops = np.array([list(bytes.fromhex(stop)) for stop in RAMPS[name].split()])
+    at = np.linspace(0, len(stops) - 1, shades)
+    channels = [np.interp(at, np.arange(len(stops)), channel) for channel in stops.T]
+    colors: Colors = np.rint(np.stack(channels, axis=1)).astype(np.uint8)
+    return colors
 
 
 def pull_colors(to_colors: ArrayLike, indices: IntArray) -> Colors:

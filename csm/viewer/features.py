@@ -54,23 +54,23 @@ def compact_features(features: Sequence[ArrayLike], components: int = COMPONENTS
     ConfigError
         If there are no features, or they are not matrices with the same number of columns.
     """
-    rows = [np.asarray(f, dtype=np.float64) for f in features]
+    rows = [np.asarray(f) for f in features]
     if not rows or any(f.ndim != 2 or f.shape[1:] != rows[0].shape[1:] or not f.shape[1] for f in rows):
         raise ConfigError(
             f"features have shapes {[f.shape for f in rows]}, wanted one row per vertex and the same number of columns "
             "for every shape; describe all shapes with one descriptor"
         )
     known = [np.asarray(np.isfinite(f).all(axis=1)) for f in rows]
-    together = np.concatenate([f[k] for f, k in zip(rows, known, strict=True)])
-    centre = together.mean(axis=0) if len(together) else np.zeros(rows[0].shape[1])
-    kept, axes = _principal_axes(together - centre, components)
-    scores = [(np.where(k[:, None], f, centre) - centre) @ axes for f, k in zip(rows, known, strict=True)]
-    largest = np.max([np.abs(s).max(axis=0, initial=0.0) for s in scores], axis=0)
+    together = np.concatenate([f[k] for f, k in zip(rows, known, strict=True)], dtype=np.float64)
+    if len(together):
+        together -= together.mean(axis=0)
+    kept, axes = _principal_axes(together, components)
+    scores = together @ axes
+    largest = np.abs(scores).max(axis=0, initial=0.0)
     steps = np.where(largest > 0, largest, 1.0) / _LARGEST
-    codes = tuple(
-        np.where(k[:, None], np.rint(s / steps), UNKNOWN).astype(np.int8) for s, k in zip(scores, known, strict=True)
-    )
-    return CompactFeatures(codes, steps, kept)
+    found = np.full((sum(map(len, rows)), axes.shape[1]), UNKNOWN, dtype=np.int8)
+    found[np.concatenate(known)] = np.rint(scores / steps)
+    return CompactFeatures(tuple(np.split(found, np.cumsum([len(f) for f in rows])[:-1])), steps, kept)
 
 
 def _principal_axes(centred: FloatArray, components: int) -> tuple[float, FloatArray]:

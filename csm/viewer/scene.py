@@ -15,11 +15,8 @@ from csm._types import FloatArray, IntArray
 from csm.errors import ConfigError, MeshError
 from csm.mesh.shape import Mesh
 from csm.viewer.camera import View, body_axes
-from csm.viewer.colors import ERROR_COLORMAP, Colors, scalar_colors
+from csm.viewer.colors import Colors, ramp
 from csm.viewer.features import compact_features
-
-COLORMAPS = {"confidence": "cividis", "errors": ERROR_COLORMAP, "distance": "YlGnBu_r"}
-"""Colour maps of the numbers, all of them monotone in lightness, so that they need no colour vision."""
 
 _SHADES = 128
 
@@ -143,7 +140,7 @@ class Viewer:
 
     @property
     def scales(self) -> dict[str, float | None]:
-        """Which numbers there are, in the order of `COLORMAPS`, and the one of the last colour; None if it varies."""
+        """Which numbers there are, in the order of `RAMPS`, and the one of the last colour; None if it varies."""
         known = {
             "confidence": 1.0 if _finite([p.confidence for p in self.panels]).size else None,
             "errors": self.top_error,
@@ -162,17 +159,14 @@ def pack(array: ArrayLike, kind: str) -> str:
     return base64.b64encode(np.ascontiguousarray(array, dtype=f"<{kind}").tobytes()).decode("ascii")
 
 
-def ramp(name: str, shades: int = _SHADES) -> Colors:
-    """Return the colours of a scale from its first to its last, shape (shades, 3)."""
-    return scalar_colors(np.linspace(0, 1, shades), colormap=COLORMAPS[name])
-
-
 def scene_json(viewer: Viewer) -> str:
     """Write a viewer as json that can stand inside a script element whatever the names are."""
     scene: dict[str, Any] = {
         "reference": viewer.reference,
         "view": {"azimuth": viewer.view.azimuth, "elevation": viewer.view.elevation},
-        "scales": {name: {"high": high, "ramp": pack(ramp(name), "u1")} for name, high in viewer.scales.items()},
+        "scales": {
+            name: {"high": high, "ramp": pack(ramp(name, _SHADES), "u1")} for name, high in viewer.scales.items()
+        },
         "panels": [_panel_data(panel, viewer) for panel in viewer.panels],
     }
     features = [panel.features for panel in viewer.panels if panel.features is not None]

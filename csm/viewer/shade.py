@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
 
 from csm._types import Float32Array, FloatArray, IntArray
 
@@ -44,6 +43,8 @@ def creases(depth: Float32Array, covered: IntArray, shape: tuple[int, int]) -> F
     """
     if covered.size == 0:
         return np.zeros(0, np.float32)
+    from scipy.ndimage import gaussian_filter  # here, since pages need the curve of this module only
+
     radius = _CREASE_RADIUS * shape[0]
     row, column = covered // shape[1], covered % shape[1]
     here = (row - row.min(), column - column.min())  # only the part of the picture that shows something is blurred

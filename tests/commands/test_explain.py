@@ -7,8 +7,9 @@ import pytest
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 
+from csm.commands.choices import config_folder
 from csm.commands.explain import explained, known_keys
-from csm.commands.groups import config_folder, register
+from csm.commands.groups import register
 from csm.errors import ConfigError, MeshError
 
 register("data", "descriptor", "model")

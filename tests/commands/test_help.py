@@ -12,22 +12,22 @@ def test_every_option_of_every_command_is_explained(command):
     assert page.purpose
     unexplained = [key for key, _, words in page.options if not words and key not in ("source", "target")]
     assert unexplained == []
-    text = help_text(command, command)
+    text = help_text(command)
     assert all(f"  {key}=" in text for key, *_ in page.options)
 
 
 def test_groups_are_listed_with_their_options_and_single_ones_as_settings():
-    text = help_text("train", "train")
+    text = help_text("train")
     assert "csmcnn_paper (default)" in text
     assert "optimizer.lr=" in text
     assert "optimizer  " not in text.split("groups, of which")[1]
-    assert "groups" not in help_text("check", "check")
+    assert "groups" not in help_text("check")
 
 
 def test_words_without_a_key_are_in_the_usage():
-    assert help_text("match", "match").startswith("usage: csm match SOURCE TARGET OUT [key=value ...]")
-    assert help_text("bench", "bench").startswith("usage: csm bench [TARGETS ...] [key=value ...]")
+    assert help_text("match").startswith("usage: csm match SOURCE TARGET OUT [key=value ...]")
+    assert help_text("bench").startswith("usage: csm bench [TARGETS ...] [key=value ...]")
 
 
 def test_no_line_is_wider_than_a_terminal():
-    assert max(len(line) for command in COMMANDS for line in help_text(command, command).splitlines()) <= 120
+    assert max(len(line) for command in COMMANDS for line in help_text(command).splitlines()) <= 120

@@ -6,7 +6,7 @@ import pytest
 from hydra import compose, initialize_config_dir
 from omegaconf import OmegaConf
 
-from csm.commands.app import config_folder
+from csm.commands.choices import config_folder
 from csm.commands.matrix import rows_of
 from csm.errors import ConfigError
 from csm.reproduction.learned import varied

@@ -7,7 +7,7 @@ import pytest
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 
-from csm.commands.app import config_folder
+from csm.commands.choices import config_folder
 from csm.commands.groups import plain
 from csm.commands.main import main
 from csm.reproduction.registry import STUDIES, options_of

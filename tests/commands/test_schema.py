@@ -7,7 +7,8 @@ import pytest
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 
-from csm.commands.groups import config_folder, register
+from csm.commands.choices import config_folder
+from csm.commands.groups import register
 from csm.commands.schema import Range, described, fits, require_valid
 from csm.errors import ConfigError
 

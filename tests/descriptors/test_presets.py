@@ -8,6 +8,7 @@ import pytest
 from csm import descriptors
 from csm.descriptors import ACD, FAMILIES, HKS, PRESETS, Constant, Stack, from_parameters, preset
 from csm.descriptors.base import record
+from csm.descriptors.presets import SETTINGS, classes
 from csm.errors import ConfigError
 
 
@@ -74,8 +75,9 @@ def test_a_registered_family_is_in_the_package_and_known_by_name(monkeypatch):
     with pytest.raises(AttributeError, match="Fresh"):
         descriptors.Fresh  # noqa: B018
     monkeypatch.setitem(FAMILIES, "fresh", Fresh)
-    assert descriptors.Fresh is Fresh
     assert from_parameters("fresh") == Fresh()
+    monkeypatch.setitem(SETTINGS, "fresh_two", ("fresh:Fresh.other", {}))
+    assert classes()["csm.descriptors.fresh"] == ("Fresh",)
 
 
 def test_unknown_names_parameters_and_values_are_refused():

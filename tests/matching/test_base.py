@@ -48,6 +48,17 @@ def test_what_is_not_finite_has_no_most_probable_class() -> None:
         votes(descriptor * torch.nan, classifier)
 
 
+def test_rows_are_known_as_a_tensor_and_as_an_array() -> None:
+    rows = np.arange(24.0).reshape(12, 2)
+    for given in (rows, torch.from_numpy(rows)):
+        described = Described(sphere(0), given)
+        assert described.features.dtype == torch.float64
+        assert described.values.dtype == np.float32
+        np.testing.assert_array_equal(described.features.numpy(), rows)
+        np.testing.assert_array_equal(described.values, rows)
+        assert repr(described).endswith(", 2 features)")
+
+
 def test_a_shape_votes_once_and_only_with_a_classifier() -> None:
     descriptor, _, classifier = problem()
     described = Described(sphere(1), descriptor, classifier)

@@ -9,6 +9,7 @@ from scipy.spatial.distance import cdist
 
 from csm.errors import ConfigError
 from csm.matching import nearest as module
+from csm.matching._on_device import search
 from csm.matching.base import Described
 from csm.matching.nearest import Nearest, nearest
 from tests.shapes import sphere
@@ -60,18 +61,59 @@ def test_the_lowest_of_several_nearest_is_found_wherever_the_others_lie(dtype: t
 
 def test_memory_is_bounded_whatever_the_size(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[int] = []
-    product = torch.addmm
+    product = np.matmul
 
-    def watched(*args: torch.Tensor, **kwargs: float) -> torch.Tensor:
-        out = product(*args, **kwargs)
-        seen.append(out.numel())
-        return out
+    def watched(*args: np.ndarray, out: np.ndarray) -> np.ndarray:
+        seen.append(out.size)
+        return product(*args, out=out)
 
     monkeypatch.setattr(module, "_MAX_ELEMENTS", 5000)
-    monkeypatch.setattr(torch, "addmm", watched)
+    monkeypatch.setattr(np, "matmul", watched)
     q, c = features(123, 4, 0), features(700, 4, 1)
     np.testing.assert_array_equal(nearest(q, c), cdist(q, c).argmin(1))
     assert max(seen) <= 5000
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+@pytest.mark.parametrize("block", [3, 4096])
+def test_the_search_of_graphics_cards_finds_the_same(dtype: torch.dtype, block: int) -> None:
+    q, c = (torch.from_numpy(features(n, 8, n)).to(dtype) for n in (60, 40))
+    twins = torch.cat([c + 1e-6, c, c])
+    for queries in (q, c):
+        expected = nearest(queries, twins)
+        np.testing.assert_array_equal(search(queries, twins, block), expected)
+        np.testing.assert_array_equal(expected, cdist(queries.double(), twins.double()).argmin(1))
+
+
+def test_rows_on_a_device_are_taken_as_those_of_the_processor() -> None:
+    q, c = features(30, 5, 0), torch.from_numpy(features(20, 5, 1)).float()
+    for at in (None, np.array([3, 17]), np.array([], dtype=int)):
+        np.testing.assert_array_equal(module._on("cpu", q, c, at, 7), nearest(q, c, at=at))
+    with pytest.raises(ConfigError, match=r"\(30, 5\) against \(20, 4\)"):
+        module._on("cpu", q, c[:, 1:], None, 7)
+    with pytest.raises(ConfigError, match="not finite"):
+        module._on("cpu", q, c / 0, None, 7)
+
+
+@pytest.mark.gpu
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a graphics card that PyTorch can use")
+def test_a_graphics_card_finds_the_same() -> None:
+    q, c = features(300, 24, 0), features(411, 24, 1)
+    at = np.array([5, 299])
+    for asked in (None, at):
+        expected = nearest(q, c, at=asked)
+        np.testing.assert_array_equal(
+            nearest(torch.from_numpy(q).cuda(), torch.from_numpy(c).cuda(), at=asked), expected
+        )
+
+
+def test_equal_rows_far_from_the_others_are_decided_without_them() -> None:
+    """Rows of large numbers make the rounding of float32 wide for all, so that many are decided in float64."""
+    c = features(300, 16, 0).astype(np.float32)
+    c[:5] *= 300
+    q = c + np.float32(1e-3) * features(300, 16, 1).astype(np.float32)
+    expected = cdist(q.astype(np.float64), c.astype(np.float64)).argmin(1)
+    np.testing.assert_array_equal(nearest(q, c), expected)
 
 
 def test_only_the_vertices_asked_for() -> None:

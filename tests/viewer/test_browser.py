@@ -12,9 +12,9 @@ import pytest
 
 from csm.mesh.shape import Mesh
 from csm.viewer.camera import View
-from csm.viewer.colors import position_colors, pull_colors
+from csm.viewer.colors import position_colors, pull_colors, ramp
 from csm.viewer.html import Section, report_html, viewer_html, write_html
-from csm.viewer.scene import Panel, Viewer, ramp
+from csm.viewer.scene import Panel, Viewer
 from tests.shapes import blob, sphere
 from tests.viewer.chromium import VIEW, Shown, chromium, front, front_vertex, seen
 

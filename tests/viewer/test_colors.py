@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from csm.data.humans import load_humans
 from csm.errors import ConfigError
-from csm.viewer.colors import UNMATCHED, position_colors, pull_colors, scalar_colors
+from csm.viewer.colors import UNMATCHED, position_colors, pull_colors, ramp, scalar_colors
 from csm.viewer.shade import linear
 from tests.shapes import blob, sphere
 
@@ -99,6 +99,16 @@ def test_scalar_colours_span_the_finite_values_by_default() -> None:
     assert len(np.unique(scalar_colors([2.0, 2.0]), axis=0)) == 1
     with pytest.raises(ConfigError, match="no-such-map"):
         scalar_colors([0.0], colormap="no-such-map")
+
+
+@pytest.mark.parametrize(
+    ("name", "colormap"), [("confidence", "cividis"), ("errors", "YlOrRd"), ("distance", "YlGnBu_r")]
+)
+def test_ramps_of_pages_are_the_colour_maps_of_figures(name: str, colormap: str) -> None:
+    shades = ramp(name, 128)
+    expected = colormaps[colormap](np.linspace(0, 1, 128), bytes=True)[:, :3]
+    assert np.abs(shades.astype(int) - expected).max() <= 8
+    np.testing.assert_array_equal(ramp(name, 2), shades[[0, -1]])
 
 
 def test_pull_takes_the_colour_of_the_image() -> None:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
-import torch
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import shortest_path
 
@@ -200,8 +199,8 @@ class _Preparation:
 def _prepared(task: _Preparation) -> Float32Array | None:
     """Put the eigenpairs of a mesh into the store, and return its descriptor."""
     store = Store(task.root)
-    Described(task.mesh, torch.zeros(0, 0), store=store).spectrum(n_eigenfunctions(task.mesh))
-    return None if task.method is None else task.method.describe(task.mesh, store).features.numpy()
+    Described(task.mesh, np.zeros((0, 0)), store=store).spectrum(n_eigenfunctions(task.mesh))
+    return None if task.method is None else task.method.describe(task.mesh, store).values
 
 
 def _described(subjects: Sequence[Subject], method: Method, store: Store, device: str, run: _Run) -> tuple[Member, ...]:
@@ -211,7 +210,7 @@ def _described(subjects: Sequence[Subject], method: Method, store: Store, device
     tasks = [_Preparation(mesh, portable, store.root) for mesh in meshes]
     rows = run(_prepared, tasks, _name, "describe", "shape")
     if portable is None:
-        rows = [method.describe(mesh, store, device).features.float().cpu().numpy() for mesh in meshes]
+        rows = [method.describe(mesh, store, device).values for mesh in meshes]
     return tuple(Member(mesh, found, store.root, device) for mesh, found in zip(meshes, rows, strict=True))
 
 

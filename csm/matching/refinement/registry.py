@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
-from csm._places import load
+from csm._places import Loaded, load
 from csm.errors import ConfigError
 from csm.matching.base import Matcher
 from csm.matching.refinement.base import Refined, Refiner
@@ -18,7 +19,9 @@ PLACES = {
 }
 """Name -> file and class, whose parameters have defaults.  A new refiner is one file and one line here."""
 
-REFINERS: dict[str, type[Refiner]] = {name: load(f"csm.matching.refinement.{place}") for name, place in PLACES.items()}
+REFINERS: Loaded[type[Refiner]] = Loaded(
+    {name: partial(load, f"csm.matching.refinement.{place}") for name, place in PLACES.items()}
+)
 """The classes by name."""
 
 NONE = "none"

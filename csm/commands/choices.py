@@ -1,0 +1,58 @@
+"""What can be chosen: the folder of the configuration, and the names of the options of its groups.
+
+Nothing that is chosen is imported here, nor Hydra, so that ``csm COMMAND --help`` is quick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+
+
+def config_folder() -> Path:
+    """Return the folder of the Hydra groups: inside the installed package, or beside it in a checkout."""
+    package = Path(__file__).resolve().parent.parent
+    inside = package / "conf"
+    return inside if inside.is_dir() else package.parent / "conf"
+
+
+def descriptor_names() -> Iterable[str]:
+    """Return the names of the presets of descriptors."""
+    from csm.descriptors.presets import PRESETS
+
+    return PRESETS
+
+
+def model_names() -> Iterable[str]:
+    """Return the named settings of networks, and every network by its own name."""
+    from csm.networks.registry import MODELS, NETWORKS
+
+    return dict.fromkeys([*MODELS, *NETWORKS])
+
+
+def data_names() -> Iterable[str]:
+    """Return the names of the data sets."""
+    from csm.data.registry import DATA_SETS
+
+    return DATA_SETS
+
+
+NAMES: Mapping[str, Callable[[], Iterable[str]]] = {
+    "data": data_names,
+    "descriptor": descriptor_names,
+    "model": model_names,
+}
+"""Groups that are made from csm's registries -> the names in them."""
+
+
+def options_of(group: str) -> list[str]:
+    """Return the names that can be chosen of a group: those from a registry, and those of yaml files.
+
+    Examples
+    --------
+    >>> options_of("data")[:2], options_of("logger")
+    (['humans', 'faust'], ['csv', 'none', 'tensorboard'])
+    """
+    made = NAMES[group]() if group in NAMES else ()
+    files = sorted(path.stem for path in (config_folder() / group).glob("*.yaml"))
+    return list(dict.fromkeys([*made, *files]))
