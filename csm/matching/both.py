@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from csm._parallel import thread_map
 from csm.matching.base import Described, Matcher
 from csm.matching.confidence import confidence_of
 from csm.matching.maps import VertexMap
@@ -32,7 +33,7 @@ def match_both_ways(rule: Matcher, source: Described, target: Described) -> Both
         The shapes, described by one method.
     """
     if not isinstance(rule, Refined):
-        there, back = rule(source, target), rule(target, source)
+        there, back = thread_map(lambda sides: rule(*sides), [(source, target), (target, source)])
         return _judged(Way(there), Way(back), None, None, source, target, "")
     start = start_of(rule.matcher, source, target)
     return both_ways_of(rule.refiner(start, source, target), rule, source, target, start)
