@@ -8,12 +8,13 @@ from typing import Any
 from omegaconf import DictConfig
 
 from csm.commands.app import command, write_json
-from csm.commands.outputs import require_file_place, require_new_in_sweep, require_not_input, require_own
+from csm.commands.outputs import OVERWRITE, require_file_place, require_new_in_sweep
 from csm.errors import ConfigError
 from csm.evaluation.provenance import provenance
 from csm.mesh.check import check
 from csm.mesh.clean import Cleaned, clean
 from csm.mesh.io import file_digest, read_polygons, write_map, write_mesh
+from csm.mesh.io.owned import require_not_input, require_own
 
 
 def run(cfg: DictConfig) -> dict[str, Any]:
@@ -26,7 +27,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     require_file_place(target)
     require_new_in_sweep(target)
     require_not_input([*files, account_of(target)], [source])
-    require_own(files, account_of(target), cfg.overwrite)
+    require_own(files, account_of(target), cfg.overwrite, OVERWRITE)
     mesh = read_polygons(source, choose=cfg.choose)
     done = clean(
         mesh, weld=cfg.weld, split=cfg.split, debris=cfg.debris, orient=cfg.orient, tolerance=float(cfg.tolerance)

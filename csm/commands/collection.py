@@ -8,12 +8,13 @@ from typing import Any
 
 from omegaconf import DictConfig
 
-from csm.commands.outputs import require_new_in_sweep, require_not_input, require_own, require_place
+from csm.commands.outputs import OVERWRITE, require_new_in_sweep, require_place
 from csm.data.store import Store
 from csm.errors import ConfigError
 from csm.matching import Method
 from csm.matching.collection import match_collection
 from csm.matching.collection.build import mesh_files
+from csm.mesh.io.owned import require_not_input, require_own
 from csm.viewer.collection_folder import ACCOUNT, places, require_pairs, verdict, write_collection
 
 
@@ -38,7 +39,7 @@ def run_collection(cfg: DictConfig, method: Method, text: str) -> dict[str, Any]
     require_new_in_sweep(out)
     outputs = [out / name for name in places([path.stem for path in files])]
     require_not_input([*outputs, out / ACCOUNT], files)
-    require_own(outputs, out / ACCOUNT, cfg.overwrite)
+    require_own(outputs, out / ACCOUNT, cfg.overwrite, OVERWRITE)
     found = match_collection(
         files, method, clean=cfg.clean, store=Store(cfg.store), device=cfg.device, workers=cfg.workers
     )

@@ -12,17 +12,12 @@ from omegaconf import DictConfig
 
 from csm.commands.app import command
 from csm.commands.groups import register
-from csm.commands.outputs import (
-    checksum,
-    require_file_place,
-    require_new_in_sweep,
-    require_not_input,
-    require_own_archive,
-)
+from csm.commands.outputs import checksum, require_file_place, require_new_in_sweep, require_own_archive
 from csm.descriptors.base import Descriptor
 from csm.errors import ConfigError
 from csm.matching.subjects import subject_of
 from csm.mesh.io import atomic_path
+from csm.mesh.io.owned import require_not_input
 
 register("descriptor")
 

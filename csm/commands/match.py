@@ -11,11 +11,12 @@ from omegaconf import DictConfig
 
 from csm.commands.app import command
 from csm.commands.groups import plain, register
-from csm.commands.outputs import require_new_in_sweep, require_not_input, require_own, require_place
+from csm.commands.outputs import OVERWRITE, require_new_in_sweep, require_place
 from csm.data.store import Store
 from csm.descriptors.presets import PRESETS
 from csm.errors import ConfigError
 from csm.matching import DescriptorMethod, Method, match_meshes
+from csm.mesh.io.owned import require_not_input, require_own
 from csm.viewer.match_folder import ACCOUNT, FILES, made_by, write_match
 
 register("descriptor")
@@ -65,7 +66,7 @@ def _require_place(folder: Path, inputs: list[Path], overwrite: bool) -> None:
     require_new_in_sweep(folder)
     outputs = [folder / name for name in (*FILES, ACCOUNT)]
     require_not_input(outputs, inputs)
-    require_own(outputs[:-1], outputs[-1], overwrite)
+    require_own(outputs[:-1], outputs[-1], overwrite, OVERWRITE)
 
 
 def _method(cfg: DictConfig) -> tuple[Method, str]:

@@ -191,7 +191,10 @@ class MatchedCollection:
         return [self._given(i, j, found[i, j]) for i, j in wanted]
 
     def save(self, folder: str | os.PathLike[str], *, pairs: str = "auto", overwrite: bool = False) -> Path:
-        """Write what ``csm match folder=DIR`` writes: maps, coloured meshes, a page to look at and an account."""
+        """Write what ``csm match folder=DIR`` writes: maps, coloured meshes, a page to look at and an account.
+
+        Files that are as csm left them are replaced, others only with `overwrite`, and an input never: a DataError.
+        """
         saver: Callable[..., Path] = load("csm.viewer.collection_folder:save_collection")
         return saver(self, folder, pairs=pairs, overwrite=overwrite)
 
