@@ -7,6 +7,7 @@ from typing import Any
 
 from omegaconf import DictConfig
 
+from csm._counts import counted
 from csm.commands.app import command, write_json
 from csm.commands.outputs import OVERWRITE, require_file_place, require_new_in_sweep
 from csm.errors import ConfigError
@@ -78,10 +79,13 @@ def report(done: Cleaned, source: Path, target: Path) -> None:
     for mend in done.mends:
         print(f"{mend.kind:<13} {mend.text}")
     remaining = [finding.text for finding in check(done.mesh)]
-    print("nothing had to be mended" if not done.mends else f"{len(done.mends)} steps changed the mesh", end="; ")
+    print(
+        "nothing had to be mended" if not done.mends else f"{counted(len(done.mends), 'step')} changed the mesh",
+        end="; ",
+    )
     print("nothing remains" if not remaining else f"what remains: {'; '.join(remaining)}")
     written = ", ".join(str(path) for path in [*places(target), account_of(target)])
-    print(f"{len(done.vertex_map)} vertices -> {done.mesh.n_vertices}: {written}")
+    print(f"{counted(len(done.vertex_map), 'vertex')} -> {done.mesh.n_vertices}: {written}")
 
 
 main = command("clean")(run)

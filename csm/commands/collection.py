@@ -8,6 +8,7 @@ from typing import Any
 
 from omegaconf import DictConfig
 
+from csm._counts import counted
 from csm.commands.outputs import OVERWRITE, require_new_in_sweep, require_place
 from csm.data.store import Store
 from csm.errors import ConfigError
@@ -52,6 +53,7 @@ def run_collection(cfg: DictConfig, method: Method, text: str) -> dict[str, Any]
         print(f"mended: {edge.source} - {edge.target}")
     print(
         f"{len(found.names)} shapes matched by {text}, reference {found.reference}\n{verdict(found)}\n{out}: "
-        f"{n_maps} maps in maps/, coloured meshes in shapes/, collection.html (to look at), {ACCOUNT} (how it was made)"
+        f"{counted(n_maps, 'map')} in maps/, coloured meshes in shapes/, collection.html (to look at), {ACCOUNT} (how "
+        "it was made)"
     )
     return {"shapes": len(found.names), "pairs": len(found.edges), "mended": len(found.mended), "maps": n_maps}

@@ -9,6 +9,7 @@ from typing import Any
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
+from csm._counts import counted
 from csm.commands.app import command
 from csm.commands.groups import plain, register
 from csm.commands.outputs import OVERWRITE, require_new_in_sweep, require_place
@@ -52,9 +53,10 @@ def run(cfg: DictConfig) -> dict[str, Any]:
         print(f"note: {note}")
     source, target, unmatched = match.source, match.target, match.vertex_map.n_unmatched
     print(
-        f"{source.name} ({source.n_vertices} vertices) -> {target.name} ({target.n_vertices} vertices) by "
+        f"{source.name} ({counted(source.n_vertices, 'vertex')}) -> {target.name} "
+        f"({counted(target.n_vertices, 'vertex')}) by "
         f"{made_by(match, text)}\n"
-        + (f"{unmatched} vertices have no partner; " if unmatched else "")
+        + (f"{counted(unmatched, 'vertex has', 'vertices have')} no partner; " if unmatched else "")
         + f"{100 * match.coverage:.1f} % of the target's vertices are reached\n{match.confidence.verdict}\n"
         f"{folder}: map.txt, match.html (to look at), match.json (how it was made)"
     )

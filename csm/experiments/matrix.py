@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from csm._counts import counted
 from csm._locks import locked
 from csm._signals import saying
 from csm.data.inspection import require_sound
@@ -123,7 +124,7 @@ class Matrix:
         if table:
             write_rows(self.folder / f"{self.table}.json", table)
         if failures:
-            many = f"{len(failures)} rows of the matrix failed, the others are done:\n"
+            many = f"{counted(len(failures), 'row')} of the matrix failed, the others are done:\n"
             raise ConfigError(many + "\n".join(failures))
         if not table:
             raise ConfigError(

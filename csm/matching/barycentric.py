@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from csm._counts import counted
 from csm._types import FloatArray, IntArray
 from csm.errors import ConfigError, DataError
 from csm.matching._triangles import nearest_triangles
@@ -150,8 +151,8 @@ class BarycentricMap:
 
     def __repr__(self) -> str:
         return (
-            f"BarycentricMap({self.source} -> {self.target}, {len(self.faces)} vertices to {len(self.target_faces)} "
-            "faces)"
+            f"BarycentricMap({self.source} -> {self.target}, {counted(len(self.faces), 'vertex')} to "
+            f"{counted(len(self.target_faces), 'face')})"
         )
 
 

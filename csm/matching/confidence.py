@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from torch import Tensor
 
+from csm._counts import counted
 from csm._types import FloatArray, IntArray
 from csm.matching.calibration import Calibration, calibration
 from csm.matching.maps import VertexMap
@@ -66,7 +67,7 @@ class Confidence:
         )
 
     def __repr__(self) -> str:
-        return f"Confidence({len(self.values)} vertices, {100 * self.trusted:.0f} % trusted)"
+        return f"Confidence({counted(len(self.values), 'vertex')}, {100 * self.trusted:.0f} % trusted)"
 
 
 def _in_words(share: float) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from csm._counts import counted
 from csm._types import IntArray
 from csm.errors import DataError
 
@@ -80,7 +81,7 @@ class VertexMap:
         """
         if len(other) != self.n_target:
             raise DataError(
-                f"{self.source} -> {self.target} ends at {self.n_target} vertices, and {other.source} -> "
+                f"{self.source} -> {self.target} ends at {counted(self.n_target, 'vertex')}, and {other.source} -> "
                 f"{other.target} begins at {len(other)}: one cannot follow the other"
             )
         indices = np.where(self.indices >= 0, other.indices[self.indices], -1) if len(other) else self.indices
@@ -95,4 +96,4 @@ class VertexMap:
         return np.array(self.indices, dtype=dtype) if copy else np.asarray(self.indices, dtype=dtype)
 
     def __repr__(self) -> str:
-        return f"VertexMap({self.source} -> {self.target}, {len(self.indices)} to {self.n_target} vertices)"
+        return f"VertexMap({self.source} -> {self.target}, {len(self.indices)} to {counted(self.n_target, 'vertex')})"

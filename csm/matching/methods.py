@@ -15,6 +15,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from csm._counts import counted
 from csm._types import FloatArray
 from csm.data.prepare import Recipe, features_of
 from csm.data.store import Store
@@ -106,7 +107,7 @@ class PrecomputedMethod(Method):
     name: str = "precomputed"
 
     def __repr__(self) -> str:
-        return f"PrecomputedMethod({self.name!r}, {len(self.features)} meshes)"
+        return f"PrecomputedMethod({self.name!r}, {counted(len(self.features), 'mesh')})"
 
     @cached_property
     def key(self) -> Mapping[str, Any]:

@@ -13,6 +13,7 @@ from typing import Any, Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from csm._counts import counted
 from csm._types import FloatArray, IntArray
 from csm.errors import ConfigError, DataError
 from csm.matching.barycentric import BarycentricMap, centre_faces
@@ -123,8 +124,9 @@ def _told(given: NDArray[Any], target: Mesh) -> Kind:
         return "faces"
     if rows != n or n == m or given.dtype.kind == "O":
         raise ConfigError(
-            f"{target.name} has {n} vertices and {m} faces, and what is to be transferred is {given.dtype} of shape "
-            f"{given.shape}; wanted a row for each vertex or each face, or kind={'|'.join(get_args(Kind))}"
+            f"{target.name} has {counted(n, 'vertex')} and {counted(m, 'face')}, and what is to be transferred is "
+            f"{given.dtype} of shape {given.shape}; wanted a row for each vertex or each face, or "
+            f"kind={'|'.join(get_args(Kind))}"
         )
     if given.dtype == np.uint8 and given.ndim == 2 and given.shape[1] in (3, 4):
         return "colors"

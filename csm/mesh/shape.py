@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from csm._counts import counted
 from csm._types import FloatArray, IntArray
 from csm.errors import MeshError
 
@@ -131,7 +132,7 @@ class Mesh:
         return replace(self, vertices=self.vertices / length, scale=self.scale * length)
 
     def __repr__(self) -> str:
-        return f"Mesh({self.name!r}, {self.n_vertices} vertices, {self.n_faces} faces)"
+        return f"Mesh({self.name!r}, {counted(self.n_vertices, 'vertex')}, {counted(self.n_faces, 'face')})"
 
 
 def real_numbers(values: ArrayLike, what: str) -> FloatArray:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
+from csm._counts import counted
 from csm._types import FloatArray
 
 _DENSE_BELOW = 400  # rows; smaller problems, and those for more than a quarter of the spectrum, are solved densely
@@ -139,7 +140,7 @@ def _fault(problem: Problem, found: Pairs) -> str:
     if not error <= _ORTHONORMAL:
         return f"the eigenvectors are orthonormal only to {error:.1e}"
     missing = _missing(problem, found.evals)
-    return f"{missing} eigenvalues were passed over" if missing else ""
+    return counted(missing, "eigenvalue was passed over", "eigenvalues were passed over") if missing else ""
 
 
 def residual(problem: Problem, found: Pairs) -> float:

@@ -12,6 +12,7 @@ from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 
+from csm._counts import counted
 from csm._types import IntArray
 from csm.errors import ConfigError
 from csm.evaluation.provenance import provenance
@@ -170,8 +171,11 @@ def _page(collection: MatchedCollection, viewer: Viewer) -> str:
 def verdict(collection: MatchedCollection) -> str:
     """Return a sentence on how well the maps of the pairs agreed before they were made to agree."""
     edges = collection.edges
-    said = f"{len(edges) - len(collection.mended)} of {len(edges)} maps of single pairs agree with all others"
-    mended = f"; the other {len(collection.mended)} were replaced by what the others say" if collection.mended else ""
+    said = (
+        f"{len(edges) - len(collection.mended)} of {counted(len(edges), 'map')} of single pairs agree with all others"
+    )
+    replaced = counted(len(collection.mended), "was", "were")
+    mended = f"; the other {replaced} replaced by what the others say" if collection.mended else ""
     return f"{_agreement(collection, said, mended)}{_untrusted(collection)}"
 
 

@@ -157,7 +157,7 @@ def test_describe_gives_rows_for_the_vertices_of_the_file(csm, tmp_path):
     shutil.copy(Path(__file__).parent.parent / "cases/spot_isolated_vertex.off", tmp_path / "a.off")
     status, out, _ = csm("describe", "a.off", "d.npz", "descriptor=gps", "descriptor.k=20")
     assert status == 0
-    assert "1 vertices in no face" in out
+    assert "1 vertex in no face" in out
     values = np.load(tmp_path / "d.npz")["values"]
     assert np.isnan(values).all(axis=1).sum() == 1
     assert len(values) == 830

@@ -60,7 +60,7 @@ def test_a_folder_is_matched_and_matched_again(csm, tmp_path):
         (["folder=in", "source=a.off"], "folder=in together with source=a.off: wanted either two meshes"),
         (["a.off", "a.off", "folder=in"], "folder=in together with source=a.off target=a.off"),
         (["folder=gone"], "gone: there is no such folder; wanted one with two or more meshes"),
-        (["folder=in"], "in: has 1 mesh files, wanted two or more"),
+        (["folder=in"], "in: has 1 mesh file, wanted two or more"),
         (["folder=in", "pairs=some"], "pairs=some: wanted auto, all or reference"),
     ],
 )

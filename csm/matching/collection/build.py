@@ -13,6 +13,7 @@ import torch
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import shortest_path
 
+from csm._counts import counted
 from csm._parallel import n_processes, parallel_map
 from csm._types import Float32Array, FloatArray, IntArray
 from csm.data.store import Store
@@ -141,7 +142,7 @@ def named_shapes(shapes: Shapes) -> dict[str, MeshLike]:
         return {path.name: path for path in mesh_files(shapes)}
     found = {f"shape{i}": mesh for i, mesh in enumerate(shapes)}
     if len(found) < 2:
-        raise ConfigError(f"a collection of {len(found)} shapes: wanted two or more")
+        raise ConfigError(f"a collection of {counted(len(found), 'shape')}: wanted two or more")
     return found
 
 
@@ -160,8 +161,8 @@ def mesh_files(folder: str | os.PathLike[str]) -> list[Path]:
     files = list_files(place, *plain) or list_files(place, *_ARRAYS)
     if len(files) < 2:
         raise DataError(
-            f"{folder}: has {len(files)} mesh files, wanted two or more; csm reads {', '.join(READABLE)}, and "
-            "takes the files of the folder itself, not of folders in it"
+            f"{folder}: has {counted(len(files), 'mesh file')}, wanted two or more; csm reads {', '.join(READABLE)}, "
+            "and takes the files of the folder itself, not of folders in it"
         )
     return files
 

@@ -10,6 +10,7 @@ from itertools import permutations
 from pathlib import Path
 from typing import TypeAlias
 
+from csm._counts import counted
 from csm._parallel import n_processes, parallel_map
 from csm._places import load
 from csm._types import FloatArray, IntArray
@@ -132,9 +133,9 @@ class MatchedCollection:
         """How it was made, in words."""
         k = self.bases.shape[-1]
         return (
-            f"{len(self.names)} shapes, {len(self.edges)} pairs of them matched by several starts; {len(self.mended)} "
-            f"of these maps did not agree with the others and were replaced; functional maps of {k} functions that "
-            f"close every cycle, refined jointly with the descriptor to {self.refiner.schedule[-1]}"
+            f"{len(self.names)} shapes, {counted(len(self.edges), 'pair')} of them matched by several starts; "
+            f"{len(self.mended)} of these maps did not agree with the others and were replaced; functional maps of {k} "
+            f"functions that close every cycle, refined jointly with the descriptor to {self.refiner.schedule[-1]}"
         )
 
     @cached_property
@@ -233,5 +234,5 @@ class MatchedCollection:
     def __repr__(self) -> str:
         return (
             f"MatchedCollection({len(self.names)} shapes by {self.method.name}, reference {self.reference}, "
-            f"{len(self.mended)} of {len(self.edges)} pairs mended)"
+            f"{len(self.mended)} of {counted(len(self.edges), 'pair')} mended)"
         )

@@ -18,6 +18,7 @@ from typing import ClassVar
 import torch
 from torch import Tensor
 
+from csm._counts import counted
 from csm.errors import ConfigError
 from csm.matching.base import Described
 from csm.matching.maps import VertexMap
@@ -123,10 +124,10 @@ class Multistart(Refiner):
         found = self.solutions(starts, pair)
         best, judged = found.best, found.scores
         text = (
-            f"the best of {len(starts)} starts and {_counted(len(found.matrices))} of them (stretch "
-            f"{float(judged.stretch[best]):.2f}, commutation {float(judged.commutation[best]):.2f}, descriptor "
-            f"{float(judged.descriptor[best]):.2f}), refined jointly with the descriptor to functional maps of "
-            f"{self.climb.sizes(pair.k)[-1]} functions"
+            f"the best of {counted(len(starts), 'start')} and {counted(len(found.matrices), 'map', 'different maps')} "
+            f"of them (stretch {float(judged.stretch[best]):.2f}, commutation {float(judged.commutation[best]):.2f}, "
+            f"descriptor {float(judged.descriptor[best]):.2f}), refined jointly with the descriptor to functional maps "
+            f"of {self.climb.sizes(pair.k)[-1]} functions"
         )
         return found.matrices[best], text
 
@@ -170,10 +171,6 @@ class Multistart(Refiner):
         for size in sizes[n_guided:]:
             maps = step(matrices_of(maps, sampled, size), sampled, free)
         return maps
-
-
-def _counted(n: int) -> str:
-    return "one map" if n == 1 else f"{n} different maps"
 
 
 def _different(matrices: Tensor, most: int) -> Tensor:

@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from csm._counts import counted
 from csm._types import IntArray
 from csm.errors import ConfigError
 from csm.matching.base import Described
@@ -74,7 +75,7 @@ class ZoomOut(Refiner):
         for size in sizes[1:]:
             queries, rows = adjoint_rows(matrix, pair)
             matrix = least_squares(pair, here, candidates[nearest_rows(queries[here], rows[there])], areas, size)
-        text = f"refined by ZoomOut in {len(sizes)} steps, to functional maps of {sizes[-1]} functions"
+        text = f"refined by ZoomOut in {counted(len(sizes), 'step')}, to functional maps of {sizes[-1]} functions"
         return _result(matrix, pair, start, text, both=False)
 
 
@@ -112,7 +113,7 @@ class ICP(Refiner):
         for _ in range(self.iterations):
             queries, rows = adjoint_rows(matrix, pair)
             matrix = orthogonal(least_squares(pair, everywhere, nearest_rows(queries, rows), pair.source.areas, k))
-        text = f"refined by {self.iterations} rounds of ICP with functional maps of {k} functions"
+        text = f"refined by {counted(self.iterations, 'round')} of ICP with functional maps of {k} functions"
         return _result(matrix, pair, start, text, both=True)
 
 
@@ -150,7 +151,10 @@ class Bijective(Refiner):
         matrix = first_matrix(start.indices, pair, sizes[0])
         for size in sizes[1:]:
             matrix = _agreeing(*_to_and_fro(matrix, pair), pair, size)
-        text = f"refined by bijective ZoomOut in {len(sizes)} steps, to functional maps of {sizes[-1]} functions"
+        text = (
+            f"refined by bijective ZoomOut in {counted(len(sizes), 'step')}, to functional maps of {sizes[-1]} "
+            "functions"
+        )
         return _result(matrix, pair, start, text, both=True)
 
 

@@ -23,7 +23,7 @@ from csm.mesh.io.npz import parse_npz
 from csm.mesh.io.obj import format_obj, parse_obj
 from csm.mesh.io.off import count_off, format_off, parse_off
 from csm.mesh.io.ply import counts_ply, format_ply, parse_ply
-from csm.mesh.io.raw import RawMesh
+from csm.mesh.io.raw import RawMesh, unread
 from csm.mesh.io.stl import parse_stl
 from csm.mesh.io.vtk import parse_vtk
 from csm.mesh.polygons import PolygonMesh
@@ -139,7 +139,7 @@ def _parsed(data: bytes, path: str, suffix: str, choose: Choice) -> RawMesh:
     notes: tuple[str, ...] = ()
     if path.lower().endswith(".gz"):
         data, left = inflate(data, limit=most_unpacked(len(data)))
-        notes = (f"{left} bytes follow the compressed data; they were not read",) if left else ()
+        notes = (unread(left, "byte", "the compressed data"),) if left else ()
     if suffix in _SEVERAL:
         raw = _SEVERAL[suffix](data, choose, lambda name: read_bytes(Path(path).parent / name))
     elif choose in (None, 0, "all"):

@@ -60,9 +60,9 @@ def test_what_is_no_collection_is_named(tmp_path, store):
     write_mesh(tmp_path / "a.off", blob(2))
     with pytest.raises(DataError, match="gone: there is no such folder"):
         match_collection(tmp_path / "gone")
-    with pytest.raises(DataError, match="has 1 mesh files, wanted two or more"):
+    with pytest.raises(DataError, match="has 1 mesh file, wanted two or more"):
         match_collection(tmp_path)
-    with pytest.raises(ConfigError, match="a collection of 1 shapes"):
+    with pytest.raises(ConfigError, match="a collection of 1 shape"):
         match_collection([blob(2)])
     write_mesh(tmp_path / "a.ply", blob(2))
     with pytest.raises(DataError, match=r"a\.ply and .*a\.off have one name, 'a'"):

@@ -65,7 +65,7 @@ def test_of_several_finalists_the_best_judged_is_taken(store):
     def judged(finalists: int) -> tuple[int, float]:
         """How many maps were compared, and the sum of the scores of the one that was taken."""
         _, text = Multistart(finalists=finalists).search(found.start, pair)
-        maps = re.findall(r"(\d+) different maps|one map", text)[0]
+        maps = re.findall(r"(\d+) (?:different )?map", text)[0]
         return int(maps or 1), sum(map(float, re.findall(r"\d+\.\d+", text)))
 
     (n, alone), (several, best) = judged(1), judged(6)
