@@ -14,7 +14,7 @@ from csm.data.store import Store
 from csm.errors import ConfigError
 from csm.matching import Method
 from csm.matching.collection import match_collection
-from csm.matching.collection.build import mesh_files
+from csm.matching.collection.shapes import mesh_files
 from csm.mesh.io.owned import require_not_input, require_own
 from csm.viewer.collection_folder import ACCOUNT, places, require_pairs, verdict, write_collection
 
