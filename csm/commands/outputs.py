@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ OVERWRITE = "give another out=, or overwrite=true to replace it"
 
 
 def require_place(path: Path, what: str = "out") -> None:
-    """Raise before the work if a folder cannot be made, or written into, at `path`; nothing is made.
+    """Raise before the work if a folder cannot be made, or written into, at `path`; nothing is left there.
 
     Raises
     ------
@@ -40,6 +41,13 @@ def require_place(path: Path, what: str = "out") -> None:
         raise ConfigError(f"{what}={path}: {above} is a file, wanted a folder; choose another place")
     if not os.access(above, os.W_OK | os.X_OK):
         raise ConfigError(f"{what}={path}: the folder {above} may not be written; choose another place")
+    try:  # permissions say nothing of file systems that are read-only or hold no files, such as /proc
+        os.rmdir(tempfile.mkdtemp(prefix=".csm-", dir=above))
+    except OSError as error:
+        why = error.strerror or "the system refuses"
+        raise ConfigError(
+            f"{what}={path}: nothing can be written into the folder {above} ({why}); choose another place"
+        ) from None
 
 
 def require_file_place(path: Path, what: str = "out") -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -53,6 +54,22 @@ def test_places_that_cannot_be_written_are_named_before_the_work(tmp_path):
     with pytest.raises(ConfigError, match="this is a folder"):
         require_file_place(tmp_path)
     require_file_place(file)
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="there is no such file system")
+@pytest.mark.parametrize("place", ["/proc/csm", "/proc/csm/below"])
+def test_a_file_system_that_takes_no_files_is_named(place):
+    said = rf"^out={place}: (nothing can be written into the folder /proc \(.+\)|the folder /proc may not be written)"
+    with pytest.raises(ConfigError, match=f"{said}; choose another place$"):
+        require_place(Path(place))
+    with pytest.raises(ConfigError, match=r"choose another place$"):
+        require_file_place(Path(place) / "a.ply")
+
+
+def test_trying_a_place_leaves_nothing(tmp_path):
+    require_place(tmp_path)
+    require_place(tmp_path / "new")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_results_are_added_to_results_only(tmp_path):

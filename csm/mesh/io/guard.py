@@ -33,11 +33,11 @@ def refusals(path: str | os.PathLike[str], doing: str = "read") -> Iterator[None
     """Turn what the system says of a path into a `DataError` that names it as it was given."""
     try:
         yield
-    except FileNotFoundError:
-        raise DataError(f"{path}: there is no such file") from None
     except MemoryError:
         raise DataError(f"{path}: cannot be {doing}: there is not enough memory") from None
     except OSError as error:
+        if doing == "read" and isinstance(error, FileNotFoundError):
+            raise DataError(f"{path}: there is no such file") from None
         raise DataError(f"{path}: cannot be {doing} ({error.strerror or error})") from error
     except ValueError as error:  # a name with a zero byte
         raise DataError(f"{str(path)!r}: cannot be {doing} ({error})") from error
