@@ -160,6 +160,7 @@ def _account(match: Match, meaning: str, method: str) -> dict[str, Any]:
         "coverage": match.coverage,
         "returned": match.confidence.returned,
         "trusted": match.confidence.trusted,
+        "ambiguous": match.confidence.ambiguous,
         "verdict": match.confidence.verdict,
         "notes": list(match.notes),
         "command": made.command,
