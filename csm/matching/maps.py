@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from csm._counts import counted
 from csm._types import IntArray
@@ -46,14 +46,8 @@ class VertexMap:
     target: str = "target"
 
     def __post_init__(self) -> None:
-        given = np.asarray(self.indices)
-        wrong = given.ndim != 1 or given.dtype.kind not in "iu"
-        if wrong or given.min(initial=0) < -1 or given.max(initial=-1) >= self.n_target:
-            raise DataError(
-                f"{self.source} -> {self.target}: the map is {given.dtype} of shape {given.shape}; wanted a vector of "
-                f"integers in 0..{self.n_target - 1}, or -1 where nothing is known"
-            )
-        object.__setattr__(self, "indices", given.astype(np.int64))
+        indices = numbers_or_none(self.indices, self.n_target, f"{self.source} -> {self.target}: the map is")
+        object.__setattr__(self, "indices", indices)
 
     @property
     def coverage(self) -> float:
@@ -97,3 +91,26 @@ class VertexMap:
 
     def __repr__(self) -> str:
         return f"VertexMap({self.source} -> {self.target}, {len(self.indices)} to {counted(self.n_target, 'vertex')})"
+
+
+def numbers_or_none(values: ArrayLike, n: int, what: str) -> IntArray:
+    """Return the numbers of things that are counted from 0 to n - 1, -1 for none, as int64; `what` begins an error.
+
+    Raises
+    ------
+    DataError
+        If they are no vector of such integers.
+
+    Examples
+    --------
+    >>> numbers_or_none([2, -1], 3, "a -> b: the map is")
+    array([ 2, -1])
+    """
+    given = np.asarray(values)
+    wrong = given.ndim != 1 or given.dtype.kind not in "iu"
+    if wrong or given.min(initial=0) < -1 or given.max(initial=-1) >= n:
+        raise DataError(
+            f"{what} {given.dtype} of shape {given.shape}; wanted a vector of integers in 0..{n - 1}, or -1 where "
+            "nothing is known"
+        )
+    return given.astype(np.int64)

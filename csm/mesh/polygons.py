@@ -11,7 +11,7 @@ from csm._counts import counted
 from csm._types import BoolArray, FloatArray, IntArray
 from csm.errors import MeshError
 from csm.mesh._ears import split_polygons
-from csm.mesh.shape import Mesh, real_numbers, require_in_range, whole_numbers
+from csm.mesh.shape import Mesh, positions, require_in_range, whole_numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +45,9 @@ class PolygonMesh:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        vertices = real_numbers(self.vertices, f"{self.label}: vertices")
+        vertices = positions(self.vertices, self.label)
         corners = whole_numbers(self.corners, f"{self.label}: faces")
         sizes = whole_numbers(self.sizes, f"{self.label}: numbers of corners")
-        if vertices.ndim != 2 or vertices.shape[1] != 3:
-            raise MeshError(f"{self.label}: vertices have shape {vertices.shape}, wanted (N, 3)")
         if corners.ndim != 1 or sizes.ndim != 1 or (sizes < 0).any() or sizes.sum() != len(corners):
             raise MeshError(
                 f"{self.label}: corners have shape {corners.shape} and sizes {sizes.shape}, wanted one list of corners "
