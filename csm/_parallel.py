@@ -36,7 +36,7 @@ def n_processes(workers: int | None, n_tasks: int) -> int:
         return (os.cpu_count() or 1) if n_tasks > 2 else 0
     if isinstance(workers, bool) or not hasattr(workers, "__index__") or workers < 0:
         raise ConfigError(
-            f"workers={workers}: wanted a whole number of processes (0 works in this process, without others), "
+            f"workers={workers}: wanted a whole number of processes (1 or 0 works in this process, without others), "
             "or null for one per core"
         )
     return int(workers)

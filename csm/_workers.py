@@ -129,7 +129,7 @@ def death(worker: Worker, task: str) -> ConfigError:
         return ConfigError(f"{task}: the process that worked on it {how}; try again with fewer workers (workers=1)")
     return ConfigError(
         f"{task}: the process that worked on it ended with status {code} and no answer; what it printed above says why "
-        '(a script that calls csm needs a line `if __name__ == "__main__":`), or try workers=0, without processes'
+        '(a script that calls csm needs a line `if __name__ == "__main__":`), or try workers=1, without processes'
     )
 
 

@@ -50,6 +50,7 @@ def shown(tmp_path_factory) -> dict[str, object]:
         "Evaluation": summary_of(PAIRS),
         "Textured": texture,
         "Image": texture.images[0],
+        "Humans": csm.load_humans(),
     }
 
 

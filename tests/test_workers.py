@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
 from csm._parallel import parallel_map
 from csm.errors import ConfigError
+
+ROOT = Path(__file__).resolve().parent.parent
 
 unix = pytest.mark.skipif(sys.platform == "win32", reason="signals of Unix")
 
@@ -52,6 +56,10 @@ def fail(how: str) -> str:
     return how
 
 
+def process(_: int) -> int:
+    return os.getpid()
+
+
 class Odd(Exception):  # noqa: N818
     """An error that cannot be unpickled: it forgets its second argument."""
 
@@ -88,6 +96,16 @@ def test_a_worker_that_is_killed_is_one_sentence_with_its_task():
 def test_a_worker_that_leaves_is_told_from_one_that_is_killed():
     with pytest.raises(ConfigError, match=r"^task leave: .*status 3"):
         mapped("a", "leave", "b")
+
+
+@pytest.mark.parametrize("task", ["leave", pytest.param("die", marks=unix)])
+def test_what_is_advised_after_a_death_does_without_processes(task):
+    with pytest.raises(ConfigError) as caught:
+        mapped("a", task, "b")
+    (advised,) = re.findall(r"workers=(\d)", str(caught.value))
+    assert f"workers={advised}" in (ROOT / "docs/python.md").read_text()
+    here = os.getpid()
+    assert set(parallel_map(process, [1, 2, 3], str, int(advised), what="", unit="", progress=False)) == {here}
 
 
 def test_an_error_that_cannot_travel_is_told_by_its_text():

@@ -10,6 +10,7 @@ import trimesh
 
 import csm
 from csm.errors import CsmError
+from csm.mesh.textured import Textured
 from tests.shapes import blob
 
 ODD = [None, 3, np.zeros((4, 3)), [1, 2], {"a": 1}, trimesh.Scene([trimesh.creation.box()] * 2)]
@@ -27,6 +28,9 @@ ODD = [None, 3, np.zeros((4, 3)), [1, 2], {"a": 1}, trimesh.Scene([trimesh.creat
         csm.geodesics,
         csm.load_model,
         csm.ACD(),
+        csm.match_collection,
+        lambda odd: csm.write_mesh("a.off", odd),
+        lambda odd: csm.write_textured("a.obj", odd),
         lambda odd: csm.match(odd, blob(1), "gps"),
         lambda odd: csm.match(blob(1), blob(1), odd),
         lambda odd: csm.match(blob(1), blob(1), "gps", odd),
@@ -41,6 +45,9 @@ ODD = [None, 3, np.zeros((4, 3)), [1, 2], {"a": 1}, trimesh.Scene([trimesh.creat
         "geodesics",
         "load",
         "acd",
+        "collection",
+        "write",
+        "textured",
         "mesh",
         "method",
         "rule",
@@ -58,3 +65,19 @@ def test_a_path_is_taken_for_one(path):
     for call in (csm.read_mesh, csm.read_polygons):
         with pytest.raises(CsmError, match=r"gone\.off: there is no such file"):
             call(path)
+
+
+def test_a_writer_that_gets_the_path_last_says_so(tmp_path):
+    texture = Textured(blob(1), np.zeros((80, 3, 2)), ())
+    for write, thing, name in ((csm.write_mesh, blob(1), "Mesh"), (csm.write_textured, texture, "Textured")):
+        with pytest.raises(
+            CsmError, match=f"got a {name} and a {type(tmp_path).__name__}, the other way round; wanted the path first"
+        ):
+            write(thing, tmp_path / "a.obj")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("alone", [blob(1), trimesh.creation.box()], ids=["mesh", "trimesh"])
+def test_one_mesh_is_no_collection(alone):
+    with pytest.raises(CsmError, match=r"wanted a folder, or a list of two or more meshes; got a (Mesh|Trimesh)$"):
+        csm.match_collection(alone)

@@ -16,6 +16,7 @@ from typing import Any
 
 from omegaconf import DictConfig
 
+from csm._counts import counted
 from csm.commands.app import command
 from csm.data.folders import FolderSet, Missing, SameFaces
 from csm.data.inspection import Inspected, inspect
@@ -77,7 +78,9 @@ def run(cfg: DictConfig) -> dict[str, Any]:
 def _conclude(report: Report, folder: Path) -> dict[str, Any]:
     print(report)
     if report.n_unusable:
-        raise DataError(f"{folder}: {report.n_unusable} of {len(report.rows)} shapes cannot be used, see the table")
+        raise DataError(
+            f"{folder}: {report.n_unusable} of {counted(len(report.rows), 'shape')} cannot be used, see the table"
+        )
     return {"shapes": len(report.rows), "missing": len(report.shapes.missing)}
 
 
@@ -105,9 +108,9 @@ def check_files(paths: Sequence[Path]) -> dict[str, Any]:
     rows = [_of_file(file) for file in files]
     print("\n".join(_table(rows)))
     bad = [row for row in rows if row.problems]
-    print(f"\n{len(rows)} meshes, {len(rows) - len(bad)} can be matched")
+    print(f"\n{counted(len(rows), 'mesh')}, {len(rows) - len(bad)} can be matched")
     if bad:
-        raise DataError(f"{len(bad)} of {len(rows)} meshes cannot be used, see the table")
+        raise DataError(f"{len(bad)} of {counted(len(rows), 'mesh')} cannot be used, see the table")
     return {"shapes": len(rows), "missing": 0}
 
 
@@ -156,19 +159,19 @@ def _summary(report: Report) -> list[str]:
     noted = sum(bool(row.findings) for row in rows if row.usable)
     lines = [
         f"{shapes.root}: {shapes.layout.title}, called {shapes.name}",
-        f"{len(rows)} shapes, {len(shapes.mapped)} with correspondence; {report.n_unusable} cannot be used, "
+        f"{counted(len(rows), 'shape')}, {len(shapes.mapped)} with correspondence; {report.n_unusable} cannot be used, "
         f"{noted} usable with notes",
     ]
     if shapes.pairs:
-        lines.append(f"{len(shapes.pairs)} test pairs, {len(shapes.mapped_pairs)} with both maps")
-    lines += [f"list {name}: {len(names)} shapes" for name, names in shapes.lists.items()]
+        lines.append(f"{counted(len(shapes.pairs), 'test pair')}, {len(shapes.mapped_pairs)} with both maps")
+    lines += [f"list {name}: {counted(len(names), 'shape')}" for name, names in shapes.lists.items()]
     return lines
 
 
 def _what_is_missing(missing: Sequence[Missing]) -> list[str]:
     if not missing:
         return ["nothing is missing"]
-    lines = [f"{len(missing)} files are missing:"]
+    lines = [f"{counted(len(missing), 'file is', 'files are')} missing:"]
     for origin in dict.fromkeys(m.origin for m in missing):
         names = ", ".join(m.path for m in missing if m.origin == origin)
         lines += textwrap.wrap(names, 110, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)

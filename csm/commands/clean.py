@@ -12,13 +12,15 @@ from typing import Any
 
 from omegaconf import DictConfig
 
+from csm._counts import counted
 from csm.commands.app import command, write_json
-from csm.commands.outputs import require_file_place, require_new_in_sweep, require_not_input, require_own
+from csm.commands.outputs import OVERWRITE, require_file_place, require_new_in_sweep
 from csm.errors import ConfigError
 from csm.evaluation.provenance import provenance
 from csm.mesh.check import check
 from csm.mesh.clean import Cleaned, clean
 from csm.mesh.io import file_digest, read_polygons, write_map, write_mesh
+from csm.mesh.io.owned import require_not_input, require_own
 
 
 def run(cfg: DictConfig) -> dict[str, Any]:
@@ -31,7 +33,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     require_file_place(target)
     require_new_in_sweep(target)
     require_not_input([*files, account_of(target)], [source])
-    require_own(files, account_of(target), cfg.overwrite)
+    require_own(files, account_of(target), cfg.overwrite, OVERWRITE)
     mesh = read_polygons(source, choose=cfg.choose)
     done = clean(
         mesh, weld=cfg.weld, split=cfg.split, debris=cfg.debris, orient=cfg.orient, tolerance=float(cfg.tolerance)
@@ -82,10 +84,13 @@ def report(done: Cleaned, source: Path, target: Path) -> None:
     for mend in done.mends:
         print(f"{mend.kind:<13} {mend.text}")
     remaining = [finding.text for finding in check(done.mesh)]
-    print("nothing had to be mended" if not done.mends else f"{len(done.mends)} steps changed the mesh", end="; ")
+    print(
+        "nothing had to be mended" if not done.mends else f"{counted(len(done.mends), 'step')} changed the mesh",
+        end="; ",
+    )
     print("nothing remains" if not remaining else f"what remains: {'; '.join(remaining)}")
     written = ", ".join(str(path) for path in [*places(target), account_of(target)])
-    print(f"{len(done.vertex_map)} vertices -> {done.mesh.n_vertices}: {written}")
+    print(f"{counted(len(done.vertex_map), 'vertex')} -> {done.mesh.n_vertices}: {written}")
 
 
 main = command("clean")(run)

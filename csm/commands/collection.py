@@ -8,12 +8,14 @@ from typing import Any
 
 from omegaconf import DictConfig
 
-from csm.commands.outputs import require_new_in_sweep, require_not_input, require_own, require_place
+from csm._counts import counted
+from csm.commands.outputs import OVERWRITE, require_new_in_sweep, require_place
 from csm.data.store import Store
 from csm.errors import ConfigError
 from csm.matching import Method
 from csm.matching.collection import match_collection
-from csm.matching.collection.build import mesh_files
+from csm.matching.collection.shapes import mesh_files
+from csm.mesh.io.owned import require_not_input, require_own
 from csm.viewer.collection_folder import ACCOUNT, places, require_pairs, verdict, write_collection
 
 
@@ -38,7 +40,7 @@ def run_collection(cfg: DictConfig, method: Method, text: str) -> dict[str, Any]
     require_new_in_sweep(out)
     outputs = [out / name for name in places([path.stem for path in files])]
     require_not_input([*outputs, out / ACCOUNT], files)
-    require_own(outputs, out / ACCOUNT, cfg.overwrite)
+    require_own(outputs, out / ACCOUNT, cfg.overwrite, OVERWRITE)
     found = match_collection(
         files, method, clean=cfg.clean, store=Store(cfg.store), device=cfg.device, workers=cfg.workers
     )
@@ -51,6 +53,7 @@ def run_collection(cfg: DictConfig, method: Method, text: str) -> dict[str, Any]
         print(f"mended: {edge.source} - {edge.target}")
     print(
         f"{len(found.names)} shapes matched by {text}, reference {found.reference}\n{verdict(found)}\n{out}: "
-        f"{n_maps} maps in maps/, coloured meshes in shapes/, collection.html (to look at), {ACCOUNT} (how it was made)"
+        f"{counted(n_maps, 'map')} in maps/, coloured meshes in shapes/, collection.html (to look at), {ACCOUNT} (how "
+        "it was made)"
     )
     return {"shapes": len(found.names), "pairs": len(found.edges), "mended": len(found.mended), "maps": n_maps}

@@ -15,19 +15,15 @@ import numpy as np
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
+from csm._counts import counted
 from csm.commands.app import command
 from csm.commands.groups import register
-from csm.commands.outputs import (
-    checksum,
-    require_file_place,
-    require_new_in_sweep,
-    require_not_input,
-    require_own_archive,
-)
+from csm.commands.outputs import checksum, require_file_place, require_new_in_sweep, require_own_archive
 from csm.descriptors.base import Descriptor
 from csm.errors import ConfigError
 from csm.matching.subjects import subject_of
 from csm.mesh.io import atomic_path
+from csm.mesh.io.owned import require_not_input
 
 register("descriptor")
 
@@ -65,7 +61,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
             checksum=np.array(checksum(values)),
         )
     n, columns = values.shape
-    print(f"{subject.given.name}: {n} vertices, {columns} columns of {descriptor.name}: {out}")
+    print(f"{subject.given.name}: {counted(n, 'vertex')}, {counted(columns, 'column')} of {descriptor.name}: {out}")
     return {"vertices": n, "columns": columns}
 
 

@@ -22,6 +22,7 @@ from omegaconf.errors import (
 from csm.commands.choices import config_folder, options_of
 from csm.commands.words import nearest_names
 from csm.errors import CsmError
+from csm.experiments._moved import MOVED
 
 _EXTRAS = {
     "joblib": "sweep",
@@ -32,9 +33,6 @@ _EXTRAS = {
     "anny": "prep",
 }
 """What is missing -> the extra of csm that brings it."""
-
-_MOVED = {f"optimizer.{name}": f"learning.{name}" for name in ("loss_products", "loss_rows", "rotate")}
-"""Options of earlier versions -> where they are now."""
 
 _ADVICE = {
     errno.ENOSPC: "the disk is full; free some space, or choose another folder",
@@ -163,8 +161,8 @@ def _of_hydra(error: BaseException, config_name: str) -> str:
 
 
 def _unknown_key(key: str, config_name: str) -> str:
-    if key in _MOVED:
-        return f"{key} is now {_MOVED[key]}"
+    if key in MOVED:
+        return f"{key} is now {MOVED[key]}"
     keys = known_keys(config_name)
     if key in keys:
         return f"{key} cannot be set or left out in this way; --help and --cfg job show what it may be"

@@ -14,13 +14,15 @@ from typing import Any
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
+from csm._counts import counted
 from csm.commands.app import command
 from csm.commands.groups import plain, register
-from csm.commands.outputs import require_new_in_sweep, require_not_input, require_own, require_place
+from csm.commands.outputs import OVERWRITE, require_new_in_sweep, require_place
 from csm.data.store import Store
 from csm.descriptors.presets import PRESETS
 from csm.errors import ConfigError
 from csm.matching import DescriptorMethod, Method, match_meshes
+from csm.mesh.io.owned import require_not_input, require_own
 from csm.viewer.match_folder import ACCOUNT, FILES, made_by, write_match
 
 register("descriptor")
@@ -56,9 +58,10 @@ def run(cfg: DictConfig) -> dict[str, Any]:
         print(f"note: {note}")
     source, target, unmatched = match.source, match.target, match.vertex_map.n_unmatched
     print(
-        f"{source.name} ({source.n_vertices} vertices) -> {target.name} ({target.n_vertices} vertices) by "
+        f"{source.name} ({counted(source.n_vertices, 'vertex')}) -> {target.name} "
+        f"({counted(target.n_vertices, 'vertex')}) by "
         f"{made_by(match, text)}\n"
-        + (f"{unmatched} vertices have no partner; " if unmatched else "")
+        + (f"{counted(unmatched, 'vertex has', 'vertices have')} no partner; " if unmatched else "")
         + f"{100 * match.coverage:.1f} % of the target's vertices are reached\n{match.confidence.verdict}\n"
         f"{folder}: map.txt, match.html (to look at), match.json (how it was made)"
     )
@@ -70,7 +73,7 @@ def _require_place(folder: Path, inputs: list[Path], overwrite: bool) -> None:
     require_new_in_sweep(folder)
     outputs = [folder / name for name in (*FILES, ACCOUNT)]
     require_not_input(outputs, inputs)
-    require_own(outputs[:-1], outputs[-1], overwrite)
+    require_own(outputs[:-1], outputs[-1], overwrite, OVERWRITE)
 
 
 def _method(cfg: DictConfig) -> tuple[Method, str]:

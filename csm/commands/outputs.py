@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
-from collections.abc import Iterable, Mapping
+import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +15,13 @@ from hydra.types import RunMode
 from numpy.typing import NDArray
 
 from csm.errors import ConfigError
-from csm.mesh.io import file_digest
 
-_OVERWRITE = "give another out=, or overwrite=true to replace it"
+OVERWRITE = "give another out=, or overwrite=true to replace it"
+"""What can be done about a file that csm does not replace by itself."""
 
 
 def require_place(path: Path, what: str = "out") -> None:
-    """Raise before the work if a folder cannot be made, or written into, at `path`; nothing is made.
+    """Raise before the work if a folder cannot be made, or written into, at `path`; nothing is left there.
 
     Raises
     ------
@@ -40,6 +40,13 @@ def require_place(path: Path, what: str = "out") -> None:
         raise ConfigError(f"{what}={path}: {above} is a file, wanted a folder; choose another place")
     if not os.access(above, os.W_OK | os.X_OK):
         raise ConfigError(f"{what}={path}: the folder {above} may not be written; choose another place")
+    try:  # permissions say nothing of file systems that are read-only or hold no files, such as /proc
+        os.rmdir(tempfile.mkdtemp(prefix=".csm-", dir=above))
+    except OSError as error:
+        why = error.strerror or "the system refuses"
+        raise ConfigError(
+            f"{what}={path}: nothing can be written into the folder {above} ({why}); choose another place"
+        ) from None
 
 
 def require_file_place(path: Path, what: str = "out") -> None:
@@ -50,30 +57,6 @@ def require_file_place(path: Path, what: str = "out") -> None:
         require_place(path.parent, what)
     else:
         require_place(path, what)
-
-
-def require_not_input(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
-    """Raise if an output is one of the files that the command reads, by whatever name.
-
-    Raises
-    ------
-    ConfigError
-        With the file.
-    """
-    read = {_identity(path): path for path in inputs}
-    for path in outputs:
-        if _identity(path) in read:
-            raise ConfigError(
-                f"{path}: this is the input {read[_identity(path)]}, which would be replaced; choose another out="
-            )
-
-
-def _identity(path: Path) -> Any:
-    try:
-        found = path.stat()
-    except OSError:
-        return os.path.realpath(path)
-    return found.st_dev, found.st_ino
 
 
 def require_results(results: str | None) -> None:
@@ -94,45 +77,6 @@ def require_results(results: str | None) -> None:
         read_rows(path)
 
 
-def require_own(outputs: Iterable[Path], account: Path, overwrite: bool) -> None:
-    """Raise if an output exists that csm did not write, or that was changed since.
-
-    Parameters
-    ----------
-    outputs
-        The files to be written.
-    account
-        The json that an earlier run wrote with them: it has the hash of each under "files", by its path from there.
-    overwrite
-        Whether to let all of them be replaced.
-
-    Raises
-    ------
-    ConfigError
-        With the first such file.
-    """
-    if overwrite:
-        return
-    files = _files_of(account)
-    for path in outputs:
-        name = path.relative_to(account.parent).as_posix()
-        if os.path.lexists(path) and (not path.is_file() or files.get(name) != file_digest(path)):
-            why = "has been changed since csm wrote it" if name in files else "was not written by csm here"
-            raise ConfigError(f"{path}: there is such a file, which {why}; {_OVERWRITE}")
-    if os.path.lexists(account) and not files:
-        raise ConfigError(f"{account}: there is such a file, which was not written by csm here; {_OVERWRITE}")
-
-
-def _files_of(account: Path) -> Mapping[str, str]:
-    if not account.is_file():
-        return {}
-    try:
-        files = json.loads(account.read_text(encoding="utf-8")).get("files")
-    except (OSError, ValueError, AttributeError):
-        return {}
-    return files if isinstance(files, dict) else {}
-
-
 def require_own_archive(path: Path, arrays: Iterable[str], overwrite: bool) -> None:
     """Raise if a .npz exists that does not have the arrays that this command writes.
 
@@ -149,7 +93,7 @@ def require_own_archive(path: Path, arrays: Iterable[str], overwrite: bool) -> N
         own = False
     if not own:
         raise ConfigError(
-            f"{path}: there is such a file, which was not written by csm describe, or changed since; {_OVERWRITE}"
+            f"{path}: there is such a file, which was not written by csm describe, or changed since; {OVERWRITE}"
         )
 
 

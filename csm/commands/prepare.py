@@ -12,6 +12,7 @@ from typing import Any
 
 from omegaconf import DictConfig
 
+from csm._counts import counted
 from csm.commands.app import command
 from csm.commands.groups import make_data, register
 from csm.data.base import DataModule
@@ -34,7 +35,8 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     summary = fill_store(data, all_jobs(data), cfg.workers)
     if summary.failures:
         raise DataError(
-            f"{len(summary.failures)} shapes cannot be prepared; the others are in the store.\n{summary.table()}"
+            f"{counted(len(summary.failures), 'shape')} cannot be prepared; the others are in the "
+            f"store.\n{summary.table()}"
         )
     return {"present": summary.present, "made": summary.made, "seconds": summary.seconds}
 
@@ -58,7 +60,7 @@ def fill_store(data: DataModule, jobs: list[Job], workers: int | None) -> Summar
     root = data.store.root
     if why := data.store.why_not_writable():
         raise DataError(why)
-    print(f"preparing {len(jobs)} shapes into {root} ({_gigabytes(_existing(root))} GB free there)")
+    print(f"preparing {counted(len(jobs), 'shape')} into {root} ({_gigabytes(_existing(root))} GB free there)")
     summary = prepare(jobs, [data.recipe], data.store, workers=workers)
     print(
         f"{summary.made} made, {summary.present} already there, {len(summary.failures)} failed, "
@@ -78,7 +80,7 @@ def check_store(store: Store) -> dict[str, Any]:
             f"{len(faults)} faulty files in {store.root}; what is needed of them is computed again, and csm prepare "
             "action=prune deletes those that csm wrote:\n" + "\n".join(faults)
         )
-    print(f"{store.root}: {len(sound)} entries, all sound")
+    print(f"{store.root}: {counted(len(sound), 'entry')}, all sound")
     return {"entries": len(sound), "bytes": sum(entry.bytes for entry in sound)}
 
 
@@ -87,7 +89,7 @@ def prune_store(store: Store, unused_days: float | None) -> dict[str, Any]:
     gone = store.prune(unused_days=unused_days)
     for path in gone:
         print(f"deleted {path}")
-    print(f"{store.root}: {len(gone)} files deleted")
+    print(f"{store.root}: {counted(len(gone), 'file')} deleted")
     return {"deleted": len(gone)}
 
 

@@ -15,6 +15,7 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
+from csm._counts import counted
 from csm.commands.app import command, output_folder
 from csm.commands.groups import make_data, make_protocol, matching_of, plain, register
 from csm.commands.outputs import require_results
@@ -41,7 +42,9 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     require_device(cfg.device)
     require_results(cfg.results)
     require_sound(training.data, test=cfg.test, exact=protocol.distance == "exact" and not protocol.fallback)
-    print(f"{training.name}: {training.data.protocol}; {len(training.data.split.test)} test shapes", flush=True)
+    print(
+        f"{training.name}: {training.data.protocol}; {counted(len(training.data.split.test), 'test shape')}", flush=True
+    )
     trained = fit(training, folder, cfg.resume)
     print(f"trained for {trained.seconds / 60:.1f} minutes: {trained.checkpoint}")
     found = {"seconds": trained.seconds, "checkpoint": str(trained.checkpoint), **trained.measured}

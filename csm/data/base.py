@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from csm._counts import counted
 from csm._parallel import n_processes
 from csm.data.additional import additional
 from csm.data.folders import FolderSet, Layout
@@ -125,7 +126,9 @@ class DataModule:
             return
         summary = prepare(jobs, [self.recipe], self.store, workers=self.workers)
         if summary.failures:
-            raise DataError(f"{len(summary.failures)} of {len(jobs)} shapes cannot be used:\n{summary.table()}")
+            raise DataError(
+                f"{len(summary.failures)} of {counted(len(jobs), 'shape')} cannot be used:\n{summary.table()}"
+            )
 
     def _missing(self, name: str) -> Job | None:
         """Return what remains to be prepared of a training shape, or None if the store has everything."""

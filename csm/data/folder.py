@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from csm._counts import counted
 from csm.data.base import DataModule, DataSet
 from csm.data.folders import PAIRS, Entry, FolderSet, Layout, Missing, SameFaces, absent, listed_pairs, stems
 from csm.data.registry import recognise
@@ -80,8 +81,8 @@ def _last(train: FolderSet, n_test: int | None) -> Split:
     count = max(2 if len(names) > 2 else 1, len(names) // 5) if n_test is None else n_test
     if not 0 < count < len(names):
         raise DataError(
-            f"{train.root}: {len(names)} shapes with known correspondence cannot be divided into training shapes and "
-            f"{count} test shapes; wanted at least one of each (see n_test), or a split"
+            f"{train.root}: {counted(len(names), 'shape')} with known correspondence cannot be divided into training "
+            f"shapes and {counted(count, 'test shape')}; wanted at least one of each (see n_test), or a split"
         )
     return Split(train.name, names[:-count], names[-count:])
 

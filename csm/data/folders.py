@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
 
+from csm._counts import counted
 from csm.data._connectivity import same_connectivity, shared_mesh
 from csm.data.shapes import Shape
 from csm.errors import DataError
@@ -213,8 +214,8 @@ class FolderSet:
     def _identity(self, n: int, mesh: Mesh) -> PointMap:
         if mesh.n_vertices < n:
             raise DataError(
-                f"{self.entry(mesh.name).mesh}: has {mesh.n_vertices} vertices, but in a {self.layout.title} folder "
-                f"the first {n} are the template's; is it a remeshed or decimated copy?"
+                f"{self.entry(mesh.name).mesh}: has {counted(mesh.n_vertices, 'vertex')}, but in a {self.layout.title} "
+                f"folder the first {n} are the template's; is it a remeshed or decimated copy?"
             )
         return PointMap.identity(n, mesh.n_vertices, mesh.name)
 

@@ -59,6 +59,9 @@ class Humans(Sequence[Mesh]):
 
     arrays: Arrays
 
+    def __repr__(self) -> str:
+        return f"Humans({len(self)} shapes: {len(self.subjects)} people in {len(self.poses)} poses)"
+
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of all shapes, in order."""

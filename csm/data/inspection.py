@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+from csm._counts import counted
 from csm._progress import progress_bar
 from csm.data.base import DataModule
 from csm.data.folders import FolderSet
@@ -226,8 +227,8 @@ def _row_problems(shapes: ShapeSet, row: Inspected, eigenpairs: int = 0) -> list
     found = [Problem(shapes.name, row.name, file, "unreadable", "error", text) for text in row.problems]
     if 0 < row.n_vertices < eigenpairs:
         text = (
-            f"has {row.n_vertices} vertices, but {eigenpairs} eigenpairs are asked for (data.basis_k, descriptor.k); a "
-            "mesh has as many as it has vertices"
+            f"has {counted(row.n_vertices, 'vertex')}, but {eigenpairs} eigenpairs are asked for (data.basis_k, "
+            "descriptor.k); a mesh has as many as it has vertices"
         )
         found.append(Problem(shapes.name, row.name, file, "too_small", "error", text))
     for finding in row.findings:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from csm._counts import counted
 from csm.errors import DataError
 
 
@@ -49,7 +50,7 @@ class Split:
             If that leaves nothing to fit.
         """
         if not 0 <= n < len(self.train):
-            raise DataError(f"split {self.name}: cannot hold out {n} of {len(self.train)} training shapes")
+            raise DataError(f"split {self.name}: cannot hold out {n} of {counted(len(self.train), 'training shape')}")
         keep = len(self.train) - n
         return self.train[:keep], self.train[keep:]
 

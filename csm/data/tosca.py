@@ -9,6 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from csm._counts import counted
 from csm.data.base import DataModule, DataSet
 from csm.data.folders import FolderSet, Layout, remeshed_set
 from csm.data.registry import find_set
@@ -58,8 +59,8 @@ class ToscaDataModule(DataModule):
         if len(names) <= n_train:
             known = ", ".join(sorted({entry.template for entry in tosca.entries}))
             raise DataError(
-                f"{tosca.root}: class {category!r} has {len(names)} shapes, too few to train on {n_train} and test on "
-                f"the rest; the classes are {known}"
+                f"{tosca.root}: class {category!r} has {counted(len(names), 'shape')}, too few to train on {n_train} "
+                f"and test on the rest; the classes are {known}"
             )
         default = Split(f"tosca_{category}", tuple(names[:n_train]), tuple(names[n_train:]))
         super().__init__(tosca, [tosca], default if split is None else as_split(split), **options)

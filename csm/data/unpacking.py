@@ -11,6 +11,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from csm._counts import counted
 from csm._locks import locked
 from csm._signals import exit_status, terminable
 from csm.data.folders import FolderSet, Layout
@@ -35,9 +36,10 @@ class Unpacked:
         noted = sum(bool(row.findings) for row in self.rows if row.usable)
         n_missing = len(self.shapes.missing)
         head = (
-            f"{self.shapes.root}: {self.shapes.layout.title}, {len(self.rows)} shapes, {len(self.shapes.mapped)} with "
-            f"correspondence, {noted} with notes, {len(self.rows) - sum(r.usable for r in self.rows)} unusable, "
-            f"{n_missing} files missing" + (" (csm check lists them)" if n_missing else "")
+            f"{self.shapes.root}: {self.shapes.layout.title}, {counted(len(self.rows), 'shape')}, "
+            f"{len(self.shapes.mapped)} with correspondence, {noted} with notes, "
+            f"{len(self.rows) - sum(r.usable for r in self.rows)} unusable, "
+            f"{counted(n_missing, 'file')} missing" + (" (csm check lists them)" if n_missing else "")
         )
         return "\n".join([head, *bad])
 

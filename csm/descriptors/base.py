@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from csm._counts import counted
 from csm._types import FloatArray
 from csm.mesh.inputs import MeshLike, as_mesh
 from csm.operators.operators import Operators
@@ -52,7 +53,7 @@ class Features:
     def __repr__(self) -> str:
         n, q = self.shape
         ends = self.columns[:1] + self.columns[1:][-1:]
-        return f"Features({n} vertices, {q} columns: {' ... '.join(ends)})"
+        return f"Features({counted(n, 'vertex')}, {counted(q, 'column')}: {' ... '.join(ends)})"
 
 
 @dataclass(frozen=True)

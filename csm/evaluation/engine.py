@@ -16,6 +16,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Protocol, TypeVar
 
+from csm._counts import counted
 from csm._parallel import n_processes, parallel_map
 from csm.data.prepare import Job, prepare
 from csm.data.shapes import InMemory, Shape, ShapeSet, templates_of
@@ -133,7 +134,7 @@ def _run(plan: Plan, pairs: Sequence[Pair], workers: int | None, keep_pairs: boo
         _log.warning("%s is left out: %s", what, why)
     if not any(measured for measured, _ in found.values()):
         raise DataError(
-            f"{plan.shapes.name}: none of the {len(pairs)} pairs could be measured:\n"
+            f"{plan.shapes.name}: none of the {counted(len(pairs), 'pair')} could be measured:\n"
             + "\n".join(f"{what}: {why}" for what, why in reasons.items())
         )
     seconds = time.perf_counter() - begun
@@ -180,7 +181,7 @@ def _prepare(plan: Plan, pairs: Sequence[Pair], workers: int | None, progress: b
     jobs = [Job(plan.shapes, name) for name in names]
     summary = prepare(jobs, wanted, plan.store, workers=workers, progress=progress)
     if summary.failures and not plan.skip_failures:
-        raise DataError(f"{len(summary.failures)} of {len(jobs)} shapes cannot be used:\n{summary.table()}")
+        raise DataError(f"{len(summary.failures)} of {counted(len(jobs), 'shape')} cannot be used:\n{summary.table()}")
     labels = {job.label: job.name for job in jobs}
     return {labels[label]: why for label, why in summary.failures}
 

@@ -11,6 +11,7 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
+from csm._counts import counted
 from csm._types import BoolArray, IntArray
 from csm.errors import ConfigError, DataError
 from csm.evaluation.metrics import FLIP_MARGIN
@@ -171,7 +172,7 @@ class EvaluationProtocol:
         if unknown:
             raise DataError(
                 f"the pair list names {unknown[0]!r} and {len(unknown) - 1} more that are not among the "
-                f"{len(names)} shapes that can be evaluated"
+                f"{counted(len(names), 'shape')} that can be evaluated"
             )
         across = [(a, b) for a, b in pairs if template[a] != template[b]]
         if across:
@@ -181,7 +182,7 @@ class EvaluationProtocol:
                 "templates, so that nothing tells which vertices correspond; leave them out"
             )
         if not pairs:
-            raise DataError(f"there is no pair to evaluate: {len(names)} shapes, pairs={self.pairs!r}")
+            raise DataError(f"there is no pair to evaluate: {counted(len(names), 'shape')}, pairs={self.pairs!r}")
         if self.sample is not None and self.sample < len(pairs):
             kept = np.random.default_rng(self.seed).choice(len(pairs), self.sample, replace=False)
             pairs = [pairs[i] for i in sorted(kept)]

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from csm._counts import counted
 from csm._types import Arrays, FloatArray
 from csm.evaluation import metrics
 from csm.evaluation.distances import Lengths, MatchedPoints, PointErrors
@@ -124,7 +125,7 @@ class Evaluation:
 
     def __repr__(self) -> str:
         error = f"{1000 * self.summary['age']:.1f} thousandths of the {self.protocol.normaliser}" if self.rows else "?"
-        return f"Evaluation({self.method}, {self.matcher}: {error} over {len(self.rows)} pairs)"
+        return f"Evaluation({self.method}, {self.matcher}: {error} over {counted(len(self.rows), 'pair')})"
 
 
 def summarise(

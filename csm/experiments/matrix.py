@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from csm._counts import counted
 from csm._locks import locked
 from csm._signals import saying
 from csm.data.inspection import require_sound
@@ -23,6 +24,7 @@ from csm.data.store import Store
 from csm.errors import ConfigError, CsmError, DataError
 from csm.evaluation.protocol import EvaluationProtocol
 from csm.evaluation.report import ResultRow, average_seeds, read_rows, write_curves_csv, write_rows
+from csm.experiments._moved import MOVED
 from csm.experiments.pairs import write_pairs
 from csm.experiments.resuming import last_checkpoint, require_same_settings
 from csm.experiments.testing import measure_set
@@ -37,9 +39,6 @@ _log = logging.getLogger(__name__)
 
 ROW = "row.json"
 """How the row in a folder is trained."""
-
-_MOVED = {f"optimizer.{name}": f"learning.{name}" for name in ("loss_products", "loss_rows", "rotate")}
-"""Options that stand in another group in the ``row.json`` of earlier versions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +122,7 @@ class Matrix:
         if table:
             write_rows(self.folder / f"{self.table}.json", table)
         if failures:
-            many = f"{len(failures)} rows of the matrix failed, the others are done:\n"
+            many = f"{counted(len(failures), 'row')} of the matrix failed, the others are done:\n"
             raise ConfigError(many + "\n".join(failures))
         if not table:
             raise ConfigError(
@@ -251,7 +250,7 @@ def require_same_training(folder: Path, identity: Mapping[str, Any]) -> bool:
 
 def _comparable(identity: Mapping[str, Any]) -> dict[str, Any]:
     """Return the settings as json has them, with today's names; where classes and split files lie plays no part."""
-    found: dict[str, Any] = {_MOVED.get(k, k): value for k, value in json.loads(json.dumps(dict(identity))).items()}
+    found: dict[str, Any] = {MOVED.get(k, k): value for k, value in json.loads(json.dumps(dict(identity))).items()}
     for key in ("data._target_", "descriptor._target_"):
         if key in found:
             found[key] = found[key].rpartition(".")[2]

@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from csm._counts import counted
 from csm._types import FloatArray, IntArray
 from csm.errors import ConfigError, DataError
 from csm.matching._triangles import nearest_triangles
-from csm.matching.maps import VertexMap
+from csm.matching.maps import VertexMap, numbers_or_none
 from csm.mesh.shape import Mesh
 
 _ROUNDING = 1e-6
@@ -58,13 +59,8 @@ class BarycentricMap:
     target: str = "target"
 
     def __post_init__(self) -> None:
-        faces, weights = np.asarray(self.faces), np.array(self.weights, dtype=np.float64)
-        m = len(self.target_faces)
-        if faces.ndim != 1 or faces.dtype.kind not in "iu" or faces.min(initial=0) < -1 or faces.max(initial=-1) >= m:
-            raise DataError(
-                f"{self.source} -> {self.target}: the faces are {faces.dtype} of shape {faces.shape}; wanted a vector "
-                f"of integers in 0..{m - 1}, or -1 where nothing is known"
-            )
+        faces = numbers_or_none(self.faces, len(self.target_faces), f"{self.source} -> {self.target}: the faces are")
+        weights = np.array(self.weights, dtype=np.float64)
         if weights.shape != (len(faces), 3):
             raise DataError(f"{self.source} -> {self.target}: weights {weights.shape}, wanted ({len(faces)}, 3)")
         weights[faces < 0] = 0.0
@@ -75,7 +71,7 @@ class BarycentricMap:
                 f"{self.source} -> {self.target}: the weights of vertex {bad[0]} are {weights[bad[0]].tolist()}; "
                 "wanted three shares from 0 to 1 that sum to 1"
             )
-        object.__setattr__(self, "faces", faces.astype(np.int64))
+        object.__setattr__(self, "faces", faces)
         object.__setattr__(self, "weights", np.clip(weights, 0.0, 1.0))
 
     @classmethod
@@ -150,8 +146,8 @@ class BarycentricMap:
 
     def __repr__(self) -> str:
         return (
-            f"BarycentricMap({self.source} -> {self.target}, {len(self.faces)} vertices to {len(self.target_faces)} "
-            "faces)"
+            f"BarycentricMap({self.source} -> {self.target}, {counted(len(self.faces), 'vertex')} to "
+            f"{counted(len(self.target_faces), 'face')})"
         )
 
 

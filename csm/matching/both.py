@@ -34,7 +34,7 @@ def match_both_ways(rule: Matcher, source: Described, target: Described) -> Both
     """
     if not isinstance(rule, Refined):
         there, back = thread_map(lambda sides: rule(*sides), [(source, target), (target, source)])
-        return _judged(Way(there), Way(back), None, None, source, target, "")
+        return _judged(RefinedMap(Way(there), Way(back)), Way(back), None, None, source, target)
     start = start_of(rule.matcher, source, target)
     return both_ways_of(rule.refiner(start, source, target), rule, source, target, start)
 
@@ -58,22 +58,22 @@ def both_ways_of(
     first = start or start_of(rule.matcher, source, target)
     second = start_of(rule.matcher, target, source)
     backward = done.backward or rule.refiner(second, target, source).forward
-    return _judged(done.forward, backward, first, second, source, target, done.text)
+    return _judged(done, backward, first, second, source, target)
 
 
 def _judged(
-    forward: Way,
+    done: RefinedMap,
     backward: Way,
     first: VertexMap | None,
     second: VertexMap | None,
     source: Described,
     target: Described,
-    text: str,
 ) -> BothWays:
+    forward = done.forward
     there, back = forward.vertex_map, backward.vertex_map
     sides, other = Sides(source, target, there, back), Sides(target, source, back, there)
     return BothWays(
-        replace(forward, confidence=confidence_of(sides, first)),
-        replace(backward, confidence=confidence_of(other, second)),
-        text,
+        replace(forward, confidence=replace(confidence_of(sides, first), ambiguous=done.ambiguous)),
+        replace(backward, confidence=replace(confidence_of(other, second), ambiguous=done.ambiguous)),
+        done.text,
     )

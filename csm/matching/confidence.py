@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from csm._counts import counted
 from csm._types import FloatArray, IntArray
 from csm.matching.calibration import Calibration, calibration
 from csm.matching.maps import VertexMap
@@ -21,6 +22,12 @@ if TYPE_CHECKING:
 
 TRUSTED = 0.5
 """Confidence from which a partner counts as trustworthy: it is more probably right than not."""
+
+AMBIGUOUS = (
+    "the shapes look the same in several ways, such as turned or mirrored, and the map is one of several equally good "
+    "ones"
+)
+"""What is added to the verdict on symmetric shapes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,10 +43,14 @@ class Confidence:
     distance
         Shape (N_source,): from each vertex of the source to where it returns on the way there and back, through space,
         in units of the square root of the source's area; infinite for vertices without a partner.
+    ambiguous
+        Whether a refinement found another map that is about as good, since the shapes look the same in several ways.
+        `values` are those of the map that was taken, as if it were the only one.
     """
 
     values: FloatArray
     distance: FloatArray
+    ambiguous: bool = False
 
     @property
     def returned(self) -> float:
@@ -55,6 +66,11 @@ class Confidence:
     @property
     def verdict(self) -> str:
         """One sentence for people on how far to believe the map."""
+        return self._share + (f"; {AMBIGUOUS}" if self.ambiguous else "")
+
+    @property
+    def _share(self) -> str:
+        """Say how much of the source has a trustworthy partner."""
         if self.trusted >= 0.9:
             share = "all" if self.trusted == 1 else f"{np.floor(100 * self.trusted):.0f} %"
             return f"{share} of the source has a trustworthy partner (a confidence of {TRUSTED:g} or more)"
@@ -70,7 +86,7 @@ class Confidence:
         )
 
     def __repr__(self) -> str:
-        return f"Confidence({len(self.values)} vertices, {100 * self.trusted:.0f} % trusted)"
+        return f"Confidence({counted(len(self.values), 'vertex')}, {100 * self.trusted:.0f} % trusted)"
 
 
 def _in_words(share: float) -> str:

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from csm._counts import counted
 from csm._types import FloatArray, IntArray
 from csm.errors import ConfigError
 from csm.matching.nearest import nearest
@@ -109,7 +110,10 @@ def functional_map(
     if matched.all():
         return weighted.T @ psi[indices]
     if matched.sum() < k:
-        raise ConfigError(f"{int(matched.sum())} matched vertices cannot give a functional map of {k} eigenfunctions")
+        raise ConfigError(
+            f"{counted(int(matched.sum()), 'matched vertex', 'matched vertices')} cannot give a functional map of {k} "
+            "eigenfunctions"
+        )
     left, right = weighted[matched].T @ phi[matched], weighted[matched].T @ psi[indices[matched]]
     return np.linalg.solve(left, right).astype(np.float64)
 

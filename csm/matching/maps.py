@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from csm._counts import counted
 from csm._types import IntArray
 from csm.errors import DataError
 
@@ -45,14 +46,8 @@ class VertexMap:
     target: str = "target"
 
     def __post_init__(self) -> None:
-        given = np.asarray(self.indices)
-        wrong = given.ndim != 1 or given.dtype.kind not in "iu"
-        if wrong or given.min(initial=0) < -1 or given.max(initial=-1) >= self.n_target:
-            raise DataError(
-                f"{self.source} -> {self.target}: the map is {given.dtype} of shape {given.shape}; wanted a vector of "
-                f"integers in 0..{self.n_target - 1}, or -1 where nothing is known"
-            )
-        object.__setattr__(self, "indices", given.astype(np.int64))
+        indices = numbers_or_none(self.indices, self.n_target, f"{self.source} -> {self.target}: the map is")
+        object.__setattr__(self, "indices", indices)
 
     @property
     def coverage(self) -> float:
@@ -80,7 +75,7 @@ class VertexMap:
         """
         if len(other) != self.n_target:
             raise DataError(
-                f"{self.source} -> {self.target} ends at {self.n_target} vertices, and {other.source} -> "
+                f"{self.source} -> {self.target} ends at {counted(self.n_target, 'vertex')}, and {other.source} -> "
                 f"{other.target} begins at {len(other)}: one cannot follow the other"
             )
         indices = np.where(self.indices >= 0, other.indices[self.indices], -1) if len(other) else self.indices
@@ -95,4 +90,27 @@ class VertexMap:
         return np.array(self.indices, dtype=dtype) if copy else np.asarray(self.indices, dtype=dtype)
 
     def __repr__(self) -> str:
-        return f"VertexMap({self.source} -> {self.target}, {len(self.indices)} to {self.n_target} vertices)"
+        return f"VertexMap({self.source} -> {self.target}, {len(self.indices)} to {counted(self.n_target, 'vertex')})"
+
+
+def numbers_or_none(values: ArrayLike, n: int, what: str) -> IntArray:
+    """Return the numbers of things that are counted from 0 to n - 1, -1 for none, as int64; `what` begins an error.
+
+    Raises
+    ------
+    DataError
+        If they are no vector of such integers.
+
+    Examples
+    --------
+    >>> numbers_or_none([2, -1], 3, "a -> b: the map is")
+    array([ 2, -1])
+    """
+    given = np.asarray(values)
+    wrong = given.ndim != 1 or given.dtype.kind not in "iu"
+    if wrong or given.min(initial=0) < -1 or given.max(initial=-1) >= n:
+        raise DataError(
+            f"{what} {given.dtype} of shape {given.shape}; wanted a vector of integers in 0..{n - 1}, or -1 where "
+            "nothing is known"
+        )
+    return given.astype(np.int64)

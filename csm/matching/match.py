@@ -6,6 +6,7 @@ import os
 
 import numpy as np
 
+from csm._counts import counted
 from csm._parallel import thread_map
 from csm._types import Float32Array
 from csm.data.store import Store
@@ -165,8 +166,8 @@ def _compared(source: Subject, target: Subject) -> list[str]:
     parts = [body_of(mesh).n_components for mesh in meshes]
     if parts[0] != parts[1]:
         said.append(
-            f"{meshes[0].label} has {parts[0]} components of at least 1 % of the area, {meshes[1].label} {parts[1]}: "
-            "their spectra are hard to compare; join the components or match them one by one"
+            f"{meshes[0].label} has {counted(parts[0], 'component')} of at least 1 % of the area, {meshes[1].label} "
+            f"{parts[1]}: their spectra are hard to compare; join the components or match them one by one"
         )
     return said
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from csm._counts import counted
 from csm._types import FloatArray
 from csm.data.prepare import Recipe, features_of
 from csm.data.store import Store
@@ -110,7 +111,7 @@ class PrecomputedMethod(Method):
     name: str = "precomputed"
 
     def __repr__(self) -> str:
-        return f"PrecomputedMethod({self.name!r}, {len(self.features)} meshes)"
+        return f"PrecomputedMethod({self.name!r}, {counted(len(self.features), 'mesh')})"
 
     @cached_property
     def key(self) -> Mapping[str, Any]:

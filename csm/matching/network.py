@@ -10,6 +10,7 @@ from typing import Any
 
 import torch
 
+from csm._counts import counted
 from csm.data.prepare import Recipe, prepare_mesh
 from csm.data.store import Store
 from csm.learning.checkpoint import load_module
@@ -43,7 +44,7 @@ class NetworkMethod(Method):
     def trained_on(self) -> str:
         """What it was trained on, in words; empty where the checkpoint does not say."""
         known, epochs = self.training.get("set"), self.training.get("epochs")
-        return f"{known}, {epochs} epochs" if known and epochs else str(known or "")
+        return f"{known}, {counted(epochs, 'epoch')}" if known and epochs else str(known or "")
 
     @cached_property
     def key(self) -> Mapping[str, Any]:

@@ -160,7 +160,8 @@ class Match:
         folder
             Where the files go; it is made if needed.
         overwrite
-            Whether files of these names may be replaced.
+            Whether files of these names may be replaced that csm did not write, or that were changed since; files
+            that are as csm left them are replaced in any case.
 
         Returns
         -------
@@ -170,7 +171,8 @@ class Match:
         Raises
         ------
         DataError
-            If there is a file of such a name that may not be replaced, or the folder cannot be written.
+            If there is a file of such a name that may not be replaced, such as an input, or the folder cannot be
+            written.
         """
         return Path(load("csm.viewer.match_folder:save_match")(self, folder, overwrite=overwrite))
 

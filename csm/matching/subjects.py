@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
@@ -10,7 +10,6 @@ import numpy as np
 from csm._types import IntArray
 from csm.errors import ConfigError
 from csm.matching.barycentric import BarycentricMap
-from csm.matching.confidence import Confidence
 from csm.matching.maps import VertexMap
 from csm.matching.way import Way
 from csm.mesh.check import Finding, check
@@ -133,8 +132,8 @@ def _rows_of(wanted: IntArray, rows: IntArray) -> IntArray:
 def on_given(found: Way, source: Subject, target: Subject) -> Way:
     """Return one way between the cleaned meshes as one between the given ones; a functional map stays as it is."""
     precise, known, at = found.precise, found.confidence, source.cleaned.vertex_map
-    confidence = known and Confidence(
-        np.where(at >= 0, known.values[at], 0.0), np.where(at >= 0, known.distance[at], np.inf)
+    confidence = known and replace(
+        known, values=np.where(at >= 0, known.values[at], 0.0), distance=np.where(at >= 0, known.distance[at], np.inf)
     )
     return Way(
         on_given_vertices(found.vertex_map, source, target),

@@ -7,12 +7,14 @@ points and no functions: to come from the target to the source they follow the m
 
 from __future__ import annotations
 
+import difflib
 import os
 from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from csm._counts import counted
 from csm._types import FloatArray, IntArray
 from csm.errors import ConfigError, DataError
 from csm.matching.barycentric import BarycentricMap, centre_faces
@@ -85,8 +87,8 @@ def transfer(
     >>> transfer([7, 8, 9, 6], half_way, two, two)
     array([ 7,  6,  9, -1])
     """
-    if kind is not None and kind not in get_args(Kind):
-        raise ConfigError(f"kind={kind}; wanted {', '.join(get_args(Kind))}, or None to tell by the data")
+    if kind is not None:
+        _require_kind(kind)
     if isinstance(what, Textured | str | os.PathLike):
         if kind not in (None, "texture"):
             raise ConfigError(f"kind={kind} wants an array, got a {type(what).__name__}")
@@ -98,6 +100,13 @@ def transfer(
     if kind == "faces":
         return pull_faces(given, along, source, target, fill=fill)
     return _pulled(given, along, kind, fill)
+
+
+def _require_kind(kind: str) -> None:
+    if kind not in get_args(Kind):
+        near = difflib.get_close_matches(str(kind).lower(), get_args(Kind), n=1)
+        meant = f", did you mean {near[0]!r}?" if near else ""
+        raise ConfigError(f"kind={kind!r}{meant}; wanted {', '.join(get_args(Kind))}, or None to tell by the data")
 
 
 def _pulled(given: NDArray[Any], along: BarycentricMap, kind: Kind, fill: Any) -> NDArray[Any]:
@@ -123,8 +132,9 @@ def _told(given: NDArray[Any], target: Mesh) -> Kind:
         return "faces"
     if rows != n or n == m or given.dtype.kind == "O":
         raise ConfigError(
-            f"{target.name} has {n} vertices and {m} faces, and what is to be transferred is {given.dtype} of shape "
-            f"{given.shape}; wanted a row for each vertex or each face, or kind={'|'.join(get_args(Kind))}"
+            f"{target.name} has {counted(n, 'vertex')} and {counted(m, 'face')}, and what is to be transferred is "
+            f"{given.dtype} of shape {given.shape}; wanted a row for each vertex or each face, or "
+            f"kind={'|'.join(get_args(Kind))}"
         )
     if given.dtype == np.uint8 and given.ndim == 2 and given.shape[1] in (3, 4):
         return "colors"

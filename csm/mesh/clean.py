@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from csm._counts import counted
 from csm._types import BoolArray, FloatArray, IntArray
 from csm.errors import ConfigError, MeshError
 from csm.mesh.check import flat_faces
@@ -114,7 +115,7 @@ def clean(
     >>> done.mesh.n_vertices, done.vertex_map
     (4, array([ 0,  1,  2,  0,  2,  3, -1]))
     >>> done.text
-    '2 vertices welded to another at the same place; 1 vertices in no face left out'
+    '2 vertices welded to another at the same place; 1 vertex in no face left out'
     """
     for name, value in (("debris", 0.0 if debris is None else debris), ("tolerance", tolerance)):
         if isinstance(value, str) or not 0 <= value < 1:
@@ -146,8 +147,8 @@ def require_finite(mesh: Mesh | PolygonMesh) -> None:
     bad = corners[~(far < 1e100)]
     if bad.size:
         raise MeshError(
-            f"{mesh.label}: {bad.size} vertices with coordinates that are not finite, or beyond 1e100; the first is "
-            f"vertex {bad[0]}: {', '.join(f'{x:g}' for x in mesh.vertices[bad[0]])}"
+            f"{mesh.label}: {counted(bad.size, 'vertex')} with coordinates that are not finite, or beyond 1e100; the "
+            f"first is vertex {bad[0]}: {', '.join(f'{x:g}' for x in mesh.vertices[bad[0]])}"
         )
     if corners.size == 0:
         raise MeshError(f"{mesh.label}: there are no faces; csm works on surfaces, so reconstruct one first")
@@ -174,13 +175,15 @@ class _Work:
             triangles, face_map = found.mesh, found.face_map
             count = int((mesh.sizes != 3).sum())
             if count:
-                mends.append(Mend("triangulate", count, f"{count} polygons triangulated"))
+                mends.append(
+                    Mend("triangulate", count, counted(count, "polygon triangulated", "polygons triangulated"))
+                )
         n = np.arange(triangles.n_vertices)
         return cls(triangles.vertices.copy(), triangles.faces.copy(), n, n.copy(), face_map, mends)
 
-    def _did(self, kind: str, count: int, text: str) -> None:
+    def _did(self, kind: str, count: int, one: str, text: str) -> None:
         if count:
-            self.mends.append(Mend(kind, count, f"{count} {text}"))
+            self.mends.append(Mend(kind, count, f"{counted(count, one)} {text}"))
 
     def used(self) -> BoolArray:
         """Which present vertices some face uses; those that were joined with another count as used."""
@@ -195,12 +198,12 @@ class _Work:
 
     def weld(self, tolerance: float) -> None:
         count = self._join(welded(self.vertices, self.faces, tolerance))
-        self._did("weld", count, "vertices welded to another at the same place")
+        self._did("weld", count, "vertex", "welded to another at the same place")
 
     def join_short(self) -> None:
         """Join the ends of edges of no length, which have no place in a Laplacian."""
         count = self._join(joined_short_edges(self.vertices, self.faces))
-        self._did("short", count, "vertices joined with a neighbour at the same place")
+        self._did("short", count, "vertex", "joined with a neighbour at the same place")
 
     def _keep_faces(self, kept: BoolArray) -> int:
         self.faces, self.face_map = self.faces[kept], self.face_map[kept]
@@ -210,7 +213,7 @@ class _Work:
         return self._keep_faces(sound_faces(self.faces))
 
     def note_unsound_faces(self, count: int) -> None:
-        self._did("faces", count, "faces left out: corners that coincide, or a face twice")
+        self._did("faces", count, "face", "left out: corners that coincide, or a face twice")
 
     def collapse(self) -> None:
         total = 0
@@ -220,14 +223,14 @@ class _Work:
                 break
             total += count
             self._keep_faces(sound_faces(self.faces))
-        self._did("collapse", total, "vertices with faces of zero area only joined with their nearest neighbour")
+        self._did("collapse", total, "vertex", "with faces of zero area only joined with their nearest neighbour")
 
     def split(self) -> None:
         before = len(self.vertices)
         self.faces, origin = split(self.vertices, self.faces)
         self.vertices, self.origin = self.vertices[origin], self.origin[origin]
         count = len(origin) - before
-        self._did("split", count, "copies of vertices made where the surface was no manifold")
+        self._did("split", count, "copy", "of vertices made where the surface was no manifold")
 
     def drop_debris(self, fraction: float | None) -> None:
         mesh = Mesh(self.vertices, self.faces)
@@ -236,10 +239,10 @@ class _Work:
             self._keep_faces(body.faces)
             much = "; WARNING: that is most of it" if body.area_left_out > 0.5 else ""
             text = (
-                f"pieces of debris left out: each below {fraction or DEBRIS:.2g} of the area, together "
+                f"of debris left out: each below {fraction or DEBRIS:.2g} of the area, together "
                 f"{body.area_left_out:.2%}{much}"
             )
-            self._did("debris", body.n_debris, text)
+            self._did("debris", body.n_debris, "piece", text)
 
     def drop_unused(self, lone: BoolArray) -> None:
         used = self.used()
@@ -248,15 +251,17 @@ class _Work:
         number = np.where(used, np.cumsum(used) - 1, -1)
         self.faces, self.vertex_map = number[self.faces], number[self.vertex_map]
         self.vertices, self.origin = self.vertices[used], self.origin[used]
-        self._did("unreferenced", int((lone & present & ~used).sum()), "vertices in no face left out")
+        self._did("unreferenced", int((lone & present & ~used).sum()), "vertex", "in no face left out")
 
     def orient(self) -> None:
         found = turns(self.vertices, self.faces)
         self.faces[found.flip] = self.faces[found.flip][:, ::-1]
         whole = found.n_inside_out
         why = "inside out as a whole" if whole and found.flip.all() else "against their neighbours"
-        self._did("orient", int(found.flip.sum()), f"faces turned: {why}")
-        self._did("one_sided", found.n_one_sided, "components are one-sided and cannot be oriented")
+        self._did("orient", int(found.flip.sum()), "face", f"turned: {why}")
+        if found.n_one_sided:
+            text = counted(found.n_one_sided, "component is one-sided", "components are one-sided")
+            self.mends.append(Mend("one_sided", found.n_one_sided, f"{text} and cannot be oriented"))
 
     def done(self, mesh: Mesh | PolygonMesh) -> Cleaned:
         if not self.mends and isinstance(mesh, Mesh):

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from csm._counts import counted
 from csm._types import BoolArray, FloatArray, IntArray
 from csm.mesh.shape import Mesh
 from csm.mesh.topology import components, half_edges
@@ -60,9 +61,10 @@ class Body:
             return ""
         n_out = int((~self.vertices).sum())
         if self.n_debris == 0:
-            return f"{n_out} vertices in no face take no part"
+            return counted(n_out, "vertex in no face takes no part", "vertices in no face take no part")
+        part = counted(n_out, "vertex takes no part", "vertices take no part")
         return (
-            f"{n_out} vertices take no part: debris, {self.n_debris} components of less than {DEBRIS:.0%} of the area "
+            f"{part}: debris, {counted(self.n_debris, 'component')} of less than {DEBRIS:.0%} of the area "
             f"each, together {self.area_left_out:.2%}"
         )
 

@@ -57,7 +57,7 @@ def as_mesh(thing: MeshLike, name: str = "mesh") -> Mesh:
     Examples
     --------
     >>> as_mesh(([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), "one triangle")
-    Mesh('one triangle', 3 vertices, 1 faces)
+    Mesh('one triangle', 3 vertices, 1 face)
     """
     if isinstance(thing, str | os.PathLike):
         return read_mesh(thing)

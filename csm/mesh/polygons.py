@@ -7,10 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
+from csm._counts import counted
 from csm._types import BoolArray, FloatArray, IntArray
 from csm.errors import MeshError
 from csm.mesh._ears import split_polygons
-from csm.mesh.shape import Mesh, real_numbers, require_in_range, whole_numbers
+from csm.mesh.shape import Mesh, positions, require_in_range, whole_numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,11 +45,9 @@ class PolygonMesh:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        vertices = real_numbers(self.vertices, f"{self.label}: vertices")
+        vertices = positions(self.vertices, self.label)
         corners = whole_numbers(self.corners, f"{self.label}: faces")
         sizes = whole_numbers(self.sizes, f"{self.label}: numbers of corners")
-        if vertices.ndim != 2 or vertices.shape[1] != 3:
-            raise MeshError(f"{self.label}: vertices have shape {vertices.shape}, wanted (N, 3)")
         if corners.ndim != 1 or sizes.ndim != 1 or (sizes < 0).any() or sizes.sum() != len(corners):
             raise MeshError(
                 f"{self.label}: corners have shape {corners.shape} and sizes {sizes.shape}, wanted one list of corners "
@@ -101,8 +100,9 @@ class PolygonMesh:
         other = np.flatnonzero(self.sizes != 3)
         if other.size:
             raise MeshError(
-                f"{self.label}: face {other[0]} has {self.sizes[other[0]]} corners ({other.size} of {len(self.sizes)} "
-                "faces are no triangles), and csm computes on triangles; `csm clean` triangulates them"
+                f"{self.label}: face {other[0]} has {counted(self.sizes[other[0]], 'corner')} ({other.size} of "
+                f"{len(self.sizes)} faces are no triangles), and csm computes on triangles; `csm clean` triangulates "
+                "them"
             )
         faces = self.corners.reshape(-1, 3)
         return Mesh(self.vertices, faces, self.name, source=self.source, notes=self.notes)
@@ -112,7 +112,7 @@ class PolygonMesh:
         return triangulated(self)
 
     def __repr__(self) -> str:
-        return f"PolygonMesh({self.name!r}, {self.n_vertices} vertices, {self.n_faces} faces)"
+        return f"PolygonMesh({self.name!r}, {counted(self.n_vertices, 'vertex')}, {counted(self.n_faces, 'face')})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,11 +144,19 @@ def triangulated(polygons: PolygonMesh) -> Triangulated:
     if repeated.any():
         owner = np.repeat(np.arange(len(sizes)), sizes)
         touched = len(np.unique(owner[repeated]))
-        notes.append(f"{touched} polygons name a vertex twice in a row; it was counted once")
+        notes.append(
+            f"{counted(touched, 'polygon names', 'polygons name')} a vertex twice in a row; it was counted once"
+        )
         corners, sizes = corners[~repeated], np.bincount(owner[~repeated], minlength=len(sizes))
     few = int((sizes < 3).sum())
     if few:
-        notes.append(f"{few} faces have fewer than three corners and were left out")
+        notes.append(
+            counted(
+                few,
+                "face has fewer than three corners and was left out",
+                "faces have fewer than three corners and were left out",
+            )
+        )
     faces, face_map, crossing = split_polygons(polygons.vertices, corners, sizes)
     if len(crossing):
         notes.append(

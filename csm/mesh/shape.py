@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from csm._counts import counted
 from csm._types import FloatArray, IntArray
 from csm.errors import MeshError
 
@@ -48,10 +49,8 @@ class Mesh:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        vertices = real_numbers(self.vertices, f"{self.label}: vertices")
+        vertices = positions(self.vertices, self.label)
         faces = whole_numbers(self.faces, f"{self.label}: faces")
-        if vertices.ndim != 2 or vertices.shape[1] != 3:
-            raise MeshError(f"{self.label}: vertices have shape {vertices.shape}, wanted (N, 3)")
         if faces.ndim != 2 or faces.shape[1] != 3:
             raise MeshError(
                 f"{self.label}: faces have shape {faces.shape}, wanted (M, 3): csm reads triangle meshes only"
@@ -131,7 +130,15 @@ class Mesh:
         return replace(self, vertices=self.vertices / length, scale=self.scale * length)
 
     def __repr__(self) -> str:
-        return f"Mesh({self.name!r}, {self.n_vertices} vertices, {self.n_faces} faces)"
+        return f"Mesh({self.name!r}, {counted(self.n_vertices, 'vertex')}, {counted(self.n_faces, 'face')})"
+
+
+def positions(values: ArrayLike, label: str) -> FloatArray:
+    """Return a float64 copy of the vertices of the mesh `label`, shape (N, 3); MeshError if they are something else."""
+    vertices = real_numbers(values, f"{label}: vertices")
+    if vertices.ndim != 2 or vertices.shape[1] != 3:
+        raise MeshError(f"{label}: vertices have shape {vertices.shape}, wanted (N, 3)")
+    return vertices
 
 
 def real_numbers(values: ArrayLike, what: str) -> FloatArray:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from csm._counts import counted
 from csm._types import FloatArray, IntArray
 from csm.errors import MeshError
 from csm.mesh.shape import Mesh
@@ -27,7 +28,7 @@ class Image:
     data: bytes
 
     def __repr__(self) -> str:
-        return f"Image({self.suffix}, {len(self.data)} bytes)"
+        return f"Image({self.suffix}, {counted(len(self.data), 'byte')})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +59,7 @@ class Textured:
     --------
     >>> corner = Mesh(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]]), "corner")
     >>> Textured(corner, np.array([[[0, 0], [1, 0], [0, 1]]]))
-    Textured('corner', 1 of 1 faces with texture coordinates, 0 images)
+    Textured('corner', 1 of 1 face with texture coordinates, 0 images)
     """
 
     mesh: Mesh
@@ -81,8 +82,8 @@ class Textured:
             image_of[:] = -1
         if image_of.min(initial=-1) < -1 or image_of.max(initial=-1) >= len(self.images):
             raise MeshError(
-                f"{self.mesh.label}: a face has image {image_of.max()}, but there are {len(self.images)} images, which "
-                "are counted from 0"
+                f"{self.mesh.label}: a face has image {image_of.max()}, counted from 0, but the mesh has "
+                f"{counted(len(self.images), 'image')}"
             )
         image_of[np.isnan(uv[:, 0, 0])] = -1
         for key, array in (("uv", uv), ("image_of", image_of)):
@@ -102,6 +103,6 @@ class Textured:
 
     def __repr__(self) -> str:
         return (
-            f"Textured({self.mesh.name!r}, {len(self.has_uv)} of {self.mesh.n_faces} faces with texture coordinates, "
-            f"{len(self.images)} images)"
+            f"Textured({self.mesh.name!r}, {len(self.has_uv)} of {counted(self.mesh.n_faces, 'face')} with texture "
+            f"coordinates, {counted(len(self.images), 'image')})"
         )

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import eigh_tridiagonal
 
+from csm._counts import counted
 from csm._types import FloatArray
 from csm.operators._factors import Factors
 
@@ -178,7 +179,7 @@ def _fault(problem: Problem, found: Pairs) -> str:
     if not error <= _ORTHONORMAL:
         return f"the eigenvectors are orthonormal only to {error:.1e}"
     missing = _missing(problem, found.evals)
-    return f"{missing} eigenvalues were passed over" if missing else ""
+    return counted(missing, "eigenvalue was passed over", "eigenvalues were passed over") if missing else ""
 
 
 def residual(problem: Problem, found: Pairs) -> float:

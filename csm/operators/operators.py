@@ -13,6 +13,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from csm._counts import counted
 from csm._types import Arrays, FloatArray, IntArray
 from csm.mesh.check import require_usable
 from csm.mesh.debris import Body, body_of, component_areas
@@ -192,7 +193,10 @@ class Operators:
         flat = self._flat
         if flat.size == 0:
             return spectrum
-        note = f"{flat.size} faces have (almost) no area, the first is face {flat[0]}; the Laplacian floors their area"
+        note = (
+            f"{counted(flat.size, 'face has', 'faces have')} (almost) no area, the first is face {flat[0]}; the "
+            "Laplacian floors their area"
+        )
         if not self._said_flat:
             _log.warning("%s: %s", self.mesh.label, note)
             self._said_flat = True

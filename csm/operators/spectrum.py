@@ -10,6 +10,7 @@ import numpy as np
 from scipy import sparse
 from threadpoolctl import ThreadpoolController
 
+from csm._counts import counted
 from csm._types import FloatArray
 from csm.errors import ConfigError, MeshError, NumericalError
 from csm.operators._eigensolver import Pairs, Problem, attempt_once, attempts, residual
@@ -50,7 +51,7 @@ class Spectrum:
     name: str = ""
 
     def __repr__(self) -> str:
-        return f"Spectrum({self.name!r}, {len(self.evals)} eigenpairs, {len(self.mass)} vertices)"
+        return f"Spectrum({self.name!r}, {counted(len(self.evals), 'eigenpair')}, {counted(len(self.mass), 'vertex')})"
 
     def first(self, k: int) -> Spectrum:
         """Return the `k` smallest pairs of these; ConfigError if there are fewer."""
@@ -155,15 +156,16 @@ def _require_solvable(stiffness: sparse.csr_array, mass: FloatArray, k: int, nam
         raise ConfigError(f"{name}: the stiffness has shape {stiffness.shape}, but there are {n} masses")
     if not 1 <= k <= n:
         raise ConfigError(
-            f"{name}: asked for {k} eigenpairs, but {n} vertices have {n}; ask for 1 to {n}, or take a finer mesh"
+            f"{name}: asked for {counted(k, 'eigenpair')}, but {counted(n, 'vertex has', 'vertices have')} {n}; ask "
+            f"for 1 to {n}, or take a finer mesh"
         )
     if not (np.isfinite(stiffness.data).all() and np.isfinite(mass).all()):
         raise MeshError(f"{name}: the Laplacian has entries that are not finite; run `csm check` on the mesh")
     without = np.flatnonzero(mass <= 0)
     if without.size:
         raise MeshError(
-            f"{name}: {without.size} vertices have no area around them (the first is vertex {without[0]}), so the "
-            "eigenproblem has no answer; remove vertices that belong to no face with area"
+            f"{name}: {counted(without.size, 'vertex has', 'vertices have')} no area around them (the first is vertex "
+            f"{without[0]}), so the eigenproblem has no answer; remove vertices that belong to no face with area"
         )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import tempfile
@@ -13,17 +12,19 @@ from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 
+from csm._counts import counted
 from csm._types import IntArray
-from csm.errors import ConfigError, DataError
+from csm.errors import ConfigError
 from csm.evaluation.provenance import provenance
 from csm.matching.collection import MatchedCollection
 from csm.matching.methods import DescriptorMethod
-from csm.mesh.io import atomic_path, copy_file, file_digest, write_map, write_mesh
+from csm.mesh.io import write_map, write_mesh
 from csm.mesh.io.guard import refusals
+from csm.mesh.io.owned import COLLECTION, files_of, put_in_place, remove_left, require_not_input, require_own
 from csm.viewer.colors import position_colors, pull_colors
 from csm.viewer.html import Panel, Viewer, viewer_html, write_html
 
-ACCOUNT = "collection.json"
+ACCOUNT = COLLECTION
 """How the collection was matched; it has the hashes of the other files."""
 
 PAGE, REFERENCE = "collection.html", "reference.ply"
@@ -64,15 +65,13 @@ def save_collection(
     Raises
     ------
     DataError
-        If a file of such a name is there and may not be replaced, or the folder cannot be written.
+        If a file of such a name is there that csm did not write, or the folder cannot be written.
     """
     folder = Path(folder)
     require_pairs(pairs)
-    there = [name for name in (ACCOUNT, *places(collection.names)) if os.path.lexists(folder / name)]
-    if there and not overwrite:
-        raise DataError(
-            f"{folder / there[0]}: there is such a file; give another folder, or overwrite=True to replace it"
-        )
+    files = [folder / name for name in places(collection.names)]
+    require_not_input([*files, folder / ACCOUNT], [Path(mesh.source) for mesh in collection.meshes if mesh.source])
+    require_own(files, folder / ACCOUNT, overwrite)
     write_collection(collection, folder, pairs=pairs)
     return folder
 
@@ -114,15 +113,10 @@ def write_collection(
     with tempfile.TemporaryDirectory(prefix=".csm-", dir=folder) as staged:
         files = _write_files(collection, indices, Path(staged))
         took = {} if seconds is None else {"seconds": round(seconds, 2)}
-        hashes = {name: file_digest(Path(staged) / name) for name in files}
-        account = {**_account(collection, len(wanted)), **took, "files": hashes}
-        earlier = _files_of(folder / ACCOUNT)
-        with atomic_path(folder / ACCOUNT) as temporary:  # first: what comes after it is known as csm's
-            temporary.write_text(json.dumps(account, indent=1) + "\n", encoding="utf-8")
-        for name in files:
-            (folder / name).parent.mkdir(exist_ok=True)
-            copy_file(Path(staged) / name, folder / name)
-        _remove(folder, {name: known for name, known in earlier.items() if name not in hashes})
+        earlier = files_of(folder / ACCOUNT)
+        put_in_place(Path(staged), files, folder / ACCOUNT, {**_account(collection, len(wanted)), **took})
+        gone = {name: known for name, known in earlier.items() if name not in files and _OWN.fullmatch(name)}
+        remove_left(folder / ACCOUNT, gone)
     return len(wanted)
 
 
@@ -177,8 +171,11 @@ def _page(collection: MatchedCollection, viewer: Viewer) -> str:
 def verdict(collection: MatchedCollection) -> str:
     """Return a sentence on how well the maps of the pairs agreed before they were made to agree."""
     edges = collection.edges
-    said = f"{len(edges) - len(collection.mended)} of {len(edges)} maps of single pairs agree with all others"
-    mended = f"; the other {len(collection.mended)} were replaced by what the others say" if collection.mended else ""
+    said = (
+        f"{len(edges) - len(collection.mended)} of {counted(len(edges), 'map')} of single pairs agree with all others"
+    )
+    replaced = counted(len(collection.mended), "was", "were")
+    mended = f"; the other {replaced} replaced by what the others say" if collection.mended else ""
     return f"{_agreement(collection, said, mended)}{_untrusted(collection)}"
 
 
@@ -240,19 +237,3 @@ def _plain(name: str) -> str:
 
 def _map_file(source: str, target: str) -> str:
     return f"maps/{_plain(source)}_to_{_plain(target)}.txt"
-
-
-def _files_of(account: Path) -> Mapping[str, str]:
-    try:
-        files = json.loads(account.read_text(encoding="utf-8")).get("files")
-    except (OSError, ValueError, AttributeError):
-        return {}
-    return files if isinstance(files, dict) else {}
-
-
-def _remove(folder: Path, files: Mapping[str, str]) -> None:
-    """Remove maps and shapes of an earlier run that are as it wrote them."""
-    for name, known in files.items():
-        path = folder / name
-        if _OWN.fullmatch(name) and path.is_file() and not path.is_symlink() and file_digest(path) == known:
-            path.unlink()

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import os
 import tempfile
 import webbrowser
 from pathlib import Path
 from typing import Any
 
-from csm.errors import DataError
 from csm.evaluation.provenance import provenance
 from csm.matching import DescriptorMethod, Match
-from csm.mesh.io import atomic_path, copy_file, file_digest, write_map, write_mesh
+from csm.mesh.io import atomic_path, write_map, write_mesh
 from csm.mesh.io.guard import refusals
+from csm.mesh.io.owned import MATCH, put_in_place, require_not_input, require_own
 from csm.mesh.shape import Mesh
 from csm.viewer.colors import position_colors, pull_colors
 from csm.viewer.html import Panel, Viewer, viewer_html, write_html
@@ -21,7 +20,7 @@ from csm.viewer.html import Panel, Viewer, viewer_html, write_html
 FILES = ("map.txt", "map.npz", "confidence.txt", "source.ply", "target.ply", "match.html")
 """What `write_match` writes, besides its account."""
 
-ACCOUNT = "match.json"
+ACCOUNT = MATCH
 """How the match was made; it has the hashes of the other files."""
 
 
@@ -31,14 +30,12 @@ def save_match(match: Match, folder: str | os.PathLike[str], *, overwrite: bool 
     Raises
     ------
     DataError
-        If a file of such a name is there and may not be replaced, or the folder cannot be written.
+        If a file of such a name is there that csm did not write, or the folder cannot be written.
     """
     folder = Path(folder)
-    there = [name for name in (*FILES, ACCOUNT) if os.path.lexists(folder / name)]
-    if there and not overwrite:
-        raise DataError(
-            f"{folder / there[0]}: there is such a file; give another folder, or overwrite=True to replace it"
-        )
+    files = [folder / name for name in FILES]
+    require_not_input([*files, folder / ACCOUNT], [Path(m.source) for m in (match.source, match.target) if m.source])
+    require_own(files, folder / ACCOUNT, overwrite)
     write_match(match, folder, in_words(match))
     return folder
 
@@ -85,11 +82,7 @@ def write_match(match: Match, folder: Path, method: str, seconds: float | None =
     with tempfile.TemporaryDirectory(prefix=".csm-", dir=folder) as staged:
         account = _write_files(match, Path(staged), method)
         took = {} if seconds is None else {"seconds": round(seconds, 2)}
-        account = {**account, **took, "files": {n: file_digest(Path(staged) / n) for n in FILES}}
-        with atomic_path(folder / ACCOUNT) as temporary:  # first: what of the others comes after it is known as csm's
-            temporary.write_text(json.dumps(account, indent=1) + "\n", encoding="utf-8")
-        for name in FILES:
-            copy_file(Path(staged) / name, folder / name)
+        put_in_place(Path(staged), FILES, folder / ACCOUNT, {**account, **took})
 
 
 def _write_files(match: Match, folder: Path, method: str) -> dict[str, Any]:
@@ -167,6 +160,7 @@ def _account(match: Match, meaning: str, method: str) -> dict[str, Any]:
         "coverage": match.coverage,
         "returned": match.confidence.returned,
         "trusted": match.confidence.trusted,
+        "ambiguous": match.confidence.ambiguous,
         "verdict": match.confidence.verdict,
         "notes": list(match.notes),
         "command": made.command,

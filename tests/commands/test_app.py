@@ -13,35 +13,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from hydra.core.global_hydra import GlobalHydra
 
 from csm.commands import app
-from csm.commands.main import main
 from csm.mesh.io import read_mesh, write_mesh
 from tests.commands.test_pipeline import SMALL
 from tests.shapes import blob
 from tests.toyset import write_toys
 
 TRAIN = [*SMALL, "data.root=toys", "trainer.max_epochs=12", "test=false", "logger=none"]
-
-
-@pytest.fixture
-def csm(monkeypatch, tmp_path, capfd):
-    """Return a function that runs ``csm WORDS`` in an empty folder and gives status, output and error output."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("CSM_CACHE", str(tmp_path / ".store"))
-
-    def call(*words: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["csm", *words])
-        GlobalHydra.instance().clear()
-        status = 0
-        try:
-            main()
-        except SystemExit as ended:
-            status = int(ended.code or 0)
-        return (status, *capfd.readouterr())
-
-    return call
 
 
 def visible(folder: Path) -> set[str]:
@@ -157,7 +136,7 @@ def test_describe_gives_rows_for_the_vertices_of_the_file(csm, tmp_path):
     shutil.copy(Path(__file__).parent.parent / "cases/spot_isolated_vertex.off", tmp_path / "a.off")
     status, out, _ = csm("describe", "a.off", "d.npz", "descriptor=gps", "descriptor.k=20")
     assert status == 0
-    assert "1 vertices in no face" in out
+    assert "1 vertex in no face" in out
     values = np.load(tmp_path / "d.npz")["values"]
     assert np.isnan(values).all(axis=1).sum() == 1
     assert len(values) == 830

@@ -21,7 +21,7 @@ def test_table_has_a_row_per_shape_then_kind_and_what_is_missing(tmp_path):
     assert [line.split()[0] for line in lines[1:4]] == ["cat0", "cat10", "dog0"]
     assert lines[1].split()[1:3] == ["42", "80"]
     assert "SGA18/BCICP remeshed TOSCA" in str(report)
-    assert "1 files are missing" in str(report)
+    assert "1 file is missing" in str(report)
     assert "vtx_5k/corres/cat10.sym.vts" in str(report)
     assert "https://github.com/llorz" in str(report)
     assert report.n_unusable == 0

@@ -2,36 +2,14 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 
 import pytest
-from hydra.core.global_hydra import GlobalHydra
 
-from csm.commands.main import main
 from csm.mesh.io import write_mesh
 from tests.matching.collection.copies import copies
 from tests.shapes import blob
 
 SMALL = ("descriptor=wks", "descriptor.k=30", "workers=0")
-
-
-@pytest.fixture
-def csm(tmp_path, monkeypatch, capfd):
-    """Return a function that runs ``csm WORDS`` in an empty folder and gives status, output and error output."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("CSM_CACHE", str(tmp_path / ".store"))
-
-    def call(*words: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["csm", *words])
-        GlobalHydra.instance().clear()
-        status = 0
-        try:
-            main()
-        except SystemExit as ended:
-            status = int(ended.code or 0)
-        return (status, *capfd.readouterr())
-
-    return call
 
 
 def test_a_folder_is_matched_and_matched_again(csm, tmp_path):
@@ -60,7 +38,7 @@ def test_a_folder_is_matched_and_matched_again(csm, tmp_path):
         (["folder=in", "source=a.off"], "folder=in together with source=a.off: wanted either two meshes"),
         (["a.off", "a.off", "folder=in"], "folder=in together with source=a.off target=a.off"),
         (["folder=gone"], "gone: there is no such folder; wanted one with two or more meshes"),
-        (["folder=in"], "in: has 1 mesh files, wanted two or more"),
+        (["folder=in"], "in: has 1 mesh file, wanted two or more"),
         (["folder=in", "pairs=some"], "pairs=some: wanted auto, all or reference"),
     ],
 )

@@ -83,7 +83,7 @@ def test_a_split_without_training_or_test_shapes_is_refused(tmp_path, n_test):
 
 
 def test_a_single_shape_cannot_be_divided(tmp_path):
-    with pytest.raises(DataError, match=r"1 shapes .* cannot be divided"):
+    with pytest.raises(DataError, match=r"1 shape .* cannot be divided"):
         FolderDataModule(write_toys(tmp_path / "toys", 1), **CHEAP)
 
 

@@ -216,4 +216,4 @@ def test_features_keep_the_rules_of_numpy_for_copies():
 
 def test_features_are_shown_in_one_line():
     assert repr(features()) == "Features(4 vertices, 3 columns: a ... c)"
-    assert repr(features(1)) == "Features(4 vertices, 1 columns: a)"
+    assert repr(features(1)) == "Features(4 vertices, 1 column: a)"

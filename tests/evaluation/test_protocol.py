@@ -40,9 +40,9 @@ def test_pairs_are_all_or_listed_or_drawn() -> None:
 
 
 def test_pairs_that_there_are_not_are_named() -> None:
-    with pytest.raises(DataError, match="names 'y' and 1 more that are not among the 1 shapes"):
+    with pytest.raises(DataError, match="names 'y' and 1 more that are not among the 1 shape"):
         EvaluationProtocol(pairs=[("a", "y"), ("z", "a")]).choose(["a"])
-    with pytest.raises(DataError, match="no pair to evaluate: 1 shapes"):
+    with pytest.raises(DataError, match="no pair to evaluate: 1 shape"):
         EvaluationProtocol().choose(["a"])
 
 

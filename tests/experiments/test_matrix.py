@@ -136,7 +136,7 @@ def test_rows_that_fail_are_listed_when_the_others_are_done(bench):
         raise DataError("toys: the folder is gone")
 
     rows = [Row("bad", 0, broken, IDENTITY), bench.row("good")]
-    with pytest.raises(ConfigError, match=r"1 rows of the matrix failed, .*:\nbad, seed 0: toys: the folder is gone"):
+    with pytest.raises(ConfigError, match=r"1 row of the matrix failed, .*:\nbad, seed 0: toys: the folder is gone"):
         bench.fill(rows)
     assert [r.method for r in read_rows(bench.folder / "cells/matrix.json")] == ["good"]
 

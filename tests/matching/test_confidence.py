@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -94,3 +96,13 @@ def test_what_does_not_return_is_not_believed_whatever_else_speaks_for_it():
 def test_all_is_said_of_all_only():
     assert Confidence(np.ones(1000), np.zeros(1000)).verdict.startswith("all of the source")
     assert Confidence(np.r_[np.ones(999), 0.0], np.zeros(1000)).verdict.startswith("99 % of the source")
+
+
+def test_the_verdict_on_symmetric_shapes_says_that_there_are_other_maps():
+    plain = Confidence(np.ones(9), np.zeros(9))
+    assert "several" not in plain.verdict
+    symmetric = replace(plain, ambiguous=True).verdict
+    assert symmetric == (
+        f"{plain.verdict}; the shapes look the same in several ways, such as turned or mirrored, and the map is one of "
+        "several equally good ones"
+    )

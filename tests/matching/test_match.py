@@ -15,7 +15,7 @@ from csm.matching.match import _against_input
 from csm.matching.nearest import Nearest, nearest
 from csm.mesh.io import write_mesh
 from csm.mesh.shape import Mesh
-from tests.shapes import blob, rotation
+from tests.shapes import blob, rotation, torus
 
 CHEAP = HKS(k=20, n_times=8)
 
@@ -104,3 +104,12 @@ def test_a_network_that_knows_such_shapes_less_than_its_input_is_warned_of(meshe
     good = Described(ball, known, given=known)
     assert _against_input(good, good) == []
     assert _against_input(Described(ball, known), Described(ball, known)) == []  # no network
+
+
+def test_a_match_of_symmetric_shapes_says_so_in_both_directions(store):
+    lonely = Mesh(np.vstack([torus().vertices, [[9.0, 9, 9]]]), torus().faces, "torus")
+    found = csm.match(lonely, torus(), store=store)
+    for one in (found, found.inverse):
+        assert "one of several equally good ones" in one.confidence.verdict
+    other = csm.match(lonely, torus(), refine="joint", store=store)
+    assert "one of several" not in other.confidence.verdict, "one map alone tells nothing of others"

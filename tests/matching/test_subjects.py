@@ -34,7 +34,7 @@ def store(tmp_path_factory) -> Store:
         ("spot_inside_out.off", "1654 faces turned: inside out as a whole"),
         ("spot_random_face_orientation.off", "faces turned: against their neighbours"),
         ("spot_split_at_seam.off", "70 vertices welded"),
-        ("spot_isolated_vertex.off", "1 vertices in no face left out"),
+        ("spot_isolated_vertex.off", "1 vertex in no face left out"),
         ("spot_with_300_debris_triangles.off", "300 pieces of debris left out"),
     ],
 )

@@ -23,6 +23,12 @@ def moved(what, kind=None, along=ALONG, **options):
     return transfer(what, along, SOURCE, TARGET, kind, **options)
 
 
+@pytest.mark.parametrize(("word", "kind"), [("colours", "colors"), ("color", "colors"), ("Label", "labels")])
+def test_a_word_that_is_nearly_a_kind_is_answered_with_it(word, kind):
+    with pytest.raises(ConfigError, match=rf"kind='{word}', did you mean '{kind}'\?; wanted values, labels"):
+        moved(np.zeros((N, 3), np.uint8), word)
+
+
 def test_fields_are_those_where_a_vertex_lands():
     np.testing.assert_allclose(moved(TARGET.vertices), SOURCE.vertices, atol=1e-9)
     np.testing.assert_allclose(moved(TARGET.vertices[:, 2].tolist()), SOURCE.vertices[:, 2], atol=1e-9)
@@ -114,7 +120,7 @@ def test_faces_at_a_vertex_without_partner_have_none():
 
 
 def test_what_cannot_be_told_or_does_not_fit_is_named():
-    with pytest.raises(ConfigError, match="kind=tint; wanted values, labels"):
+    with pytest.raises(ConfigError, match="kind='tint'; wanted values, labels"):
         moved(np.zeros(N), "tint")
     with pytest.raises(ConfigError, match=r"has 642 vertices and 1280 faces, .* float64 of shape \(5,\)"):
         moved(np.zeros(5))

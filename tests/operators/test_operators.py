@@ -124,7 +124,7 @@ def test_floored_faces_are_recorded_also_through_a_memo():
     mesh, shelf = Mesh(square, np.array([[0, 1, 2], [0, 2, 4], [0, 4, 3], [4, 2, 3]]), "flap"), Shelf()
     for _ in range(2):
         (note,) = Operators(mesh, memo=shelf).lbo(2).notes
-        assert "1 faces" in note
+        assert "1 face has" in note
         assert "face 1" in note
 
 

@@ -152,7 +152,7 @@ def test_an_eigenvalue_passed_over_is_noticed_and_the_retry_recorded(monkeypatch
     with caplog.at_level(logging.WARNING):
         found = solve(blob(3), 20)
     assert len(found.notes) == len(caplog.records) == 1
-    assert "1 eigenvalues were passed over" in found.notes[0]
+    assert "1 eigenvalue was passed over" in found.notes[0]
     monkeypatch.undo()
     np.testing.assert_allclose(found.evals, solve(blob(3), 20).evals, atol=1e-9)
 
@@ -196,7 +196,7 @@ def test_a_wrong_guess_of_the_density_changes_nothing():
 
 def test_a_vertex_without_area_is_named():
     lonely = Mesh(np.vstack([sphere(1).vertices, [[9, 9, 9.0]]]), sphere(1).faces, "lonely")
-    with pytest.raises(MeshError, match=r"lonely: 1 vertices have no area .* vertex 42"):
+    with pytest.raises(MeshError, match=r"lonely: 1 vertex has no area .* vertex 42"):
         solve(lonely, 3)
 
 

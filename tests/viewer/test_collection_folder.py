@@ -66,6 +66,16 @@ def test_what_is_there_is_replaced_only_when_told_to(found, tmp_path):
     assert read_mesh(tmp_path / "shapes/s1.ply").n_vertices == 642
 
 
+def test_a_collection_is_saved_again_over_its_own_files(found, tmp_path):
+    found.save(tmp_path, pairs="all")
+    found.save(tmp_path, pairs="reference")
+    assert len(list((tmp_path / "maps").iterdir())) == 4
+    (tmp_path / "collection.json").write_text("{}")
+    with pytest.raises(DataError, match=r"there is such a file, which was not written by csm here"):
+        found.save(tmp_path)
+    assert (tmp_path / "collection.json").read_text() == "{}"
+
+
 def test_a_write_that_fails_leaves_nothing(found, tmp_path, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")

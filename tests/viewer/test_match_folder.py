@@ -53,6 +53,27 @@ def test_files_that_are_there_are_not_replaced(match, tmp_path):
         save_match(match, tmp_path / "file")
 
 
+def test_a_match_is_saved_again_over_its_own_files_and_over_no_others(match, tmp_path):
+    match.save(tmp_path)
+    before = (tmp_path / "map.txt").read_bytes()
+    match.inverse.save(tmp_path)
+    assert (tmp_path / "map.txt").read_bytes() != before
+    assert len(np.loadtxt(tmp_path / "map.txt")) == match.target.n_vertices
+    (tmp_path / "map.txt").write_text("mine")
+    with pytest.raises(DataError, match=r"map\.txt: there is such a file, which has been changed.*overwrite=True"):
+        match.save(tmp_path)
+    assert (tmp_path / "map.txt").read_text() == "mine"
+    match.save(tmp_path, overwrite=True)
+    assert (tmp_path / "map.txt").read_bytes() == before
+
+
+def test_a_match_is_never_saved_over_its_own_input(match, tmp_path):
+    match.save(tmp_path)
+    read = replace(match, source=read_mesh(tmp_path / "source.ply"))
+    with pytest.raises(DataError, match=r"source\.ply: this is the input .*source\.ply, which would be replaced"):
+        read.save(tmp_path, overwrite=True)
+
+
 def test_the_page_has_both_names_and_the_verdict(match):
     page = match_page(match, in_words(match))
     assert match.confidence.verdict in page

@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -16,20 +16,19 @@ from csm._parallel import n_processes, parallel_map
 from csm._types import Float32Array, FloatArray, IntArray
 from csm.data.store import Store
 from csm.descriptors.base import Descriptor
-from csm.errors import ConfigError, DataError
+from csm.errors import ConfigError
 from csm.matching.base import Described, require_device
 from csm.matching.collection.candidates import Candidates, joined, stacked
 from csm.matching.collection.climb import SIZES, consistent
 from csm.matching.collection.graph import pairs_of
 from csm.matching.collection.members import EdgeTask, Member, candidates_of, finer_map
 from csm.matching.collection.result import Cycles, Edge, MatchedCollection
+from csm.matching.collection.shapes import Shapes, named_shapes, require_names
 from csm.matching.collection.synchronise import SCALE, Agreement, agree, apart, composed, triangle_errors
 from csm.matching.embedded import n_eigenfunctions
 from csm.matching.methods import DescriptorMethod, Method, PrecomputedMethod, as_method
 from csm.matching.refinement.multistart import Multistart
 from csm.matching.subjects import Cleaning, Subject, subject_of
-from csm.mesh.inputs import MeshLike
-from csm.mesh.io import READABLE, list_files
 from csm.mesh.shape import Mesh
 
 COMPLETE = 12
@@ -37,11 +36,6 @@ COMPLETE = 12
 
 MENDED = 0.4
 """Distance of a pair's own map from the agreement, from which on it counts as another map, which was mended."""
-
-_ARRAYS = (".npz", ".mat")  # of files, which may hold something else than a mesh
-
-Shapes: TypeAlias = str | os.PathLike[str] | Sequence[MeshLike]
-"""A folder, or meshes in any form that `csm.match` takes."""
 
 
 def match_collection(
@@ -98,7 +92,7 @@ def match_collection(
     if isinstance(chosen, PrecomputedMethod):
         clean = "off"
     subjects = tuple(subject_of(mesh, clean, name) for name, mesh in named_shapes(shapes).items())
-    _require_names(subjects)
+    require_names(subjects)
     run = _Run(workers if device == "cpu" else 0, progress)
     members = _described(subjects, chosen, store, device, run)
     return _matched(subjects, members, chosen, refiner, _graph(members, near, far), run)
@@ -124,57 +118,6 @@ def _matched(
     edges = _edges(alone, agreement, pairs, [subject.given.name for subject in subjects])
     middle = medoid(pairs, both.costs[each, agreement.choice] + agreement.apart, n)
     return MatchedCollection(subjects, members, bases, edges, cycles, method, refiner, middle)
-
-
-def named_shapes(shapes: Shapes) -> dict[str, MeshLike]:
-    """Return meshes, or those of a folder, by the names that those without one of their own get.
-
-    Raises
-    ------
-    DataError
-        If it is a folder without at least two meshes.
-    ConfigError
-        If there are fewer than two shapes.
-    """
-    if isinstance(shapes, str | os.PathLike):
-        return {path.name: path for path in mesh_files(shapes)}
-    found = {f"shape{i}": mesh for i, mesh in enumerate(shapes)}
-    if len(found) < 2:
-        raise ConfigError(f"a collection of {len(found)} shapes: wanted two or more")
-    return found
-
-
-def mesh_files(folder: str | os.PathLike[str]) -> list[Path]:
-    """Return the mesh files of a folder in natural order; archives of arrays count only where there is nothing else.
-
-    Raises
-    ------
-    DataError
-        If there is no such folder, it has fewer than two meshes, or two of them have one name.
-    """
-    place = Path(folder).expanduser()
-    if not place.is_dir():
-        raise DataError(f"{folder}: there is no such folder; wanted one with two or more meshes")
-    plain = tuple(suffix for suffix in READABLE if suffix not in _ARRAYS)
-    files = list_files(place, *plain) or list_files(place, *_ARRAYS)
-    if len(files) < 2:
-        raise DataError(
-            f"{folder}: has {len(files)} mesh files, wanted two or more; csm reads {', '.join(READABLE)}, and "
-            "takes the files of the folder itself, not of folders in it"
-        )
-    return files
-
-
-def _require_names(subjects: Sequence[Subject]) -> None:
-    seen: dict[str, Subject] = {}
-    for subject in subjects:
-        other = seen.setdefault(subject.given.name, subject)
-        if other is not subject:
-            here, there = subject.given.source or "a mesh", other.given.source or "another mesh"
-            raise DataError(
-                f"{here} and {there} have one name, {subject.given.name!r}, by which maps and files are called; "
-                "rename one of them"
-            )
 
 
 @dataclass(frozen=True)

@@ -4,32 +4,39 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import permutations
 from pathlib import Path
 from typing import TypeAlias
 
+from csm._counts import counted
 from csm._parallel import n_processes, parallel_map
 from csm._places import load
 from csm._types import FloatArray, IntArray
 from csm.errors import ConfigError
 from csm.matching.both import both_ways_of
 from csm.matching.collection.members import EdgeTask, Member, both_maps, finest
+from csm.matching.confidence import confidence_of
 from csm.matching.functional import FunctionalMap
 from csm.matching.maps import VertexMap
 from csm.matching.match import match_of
 from csm.matching.methods import Method
 from csm.matching.nearest import Nearest
-from csm.matching.refinement.base import Refined
+from csm.matching.refinement.base import Refined, start_of
 from csm.matching.refinement.multistart import Multistart
 from csm.matching.refinement.pair import Pair
 from csm.matching.result import Match
-from csm.matching.subjects import Subject, on_given_vertices
+from csm.matching.signals import Sides
+from csm.matching.subjects import Subject, on_given, on_given_vertices
+from csm.matching.way import Way
 from csm.mesh.shape import Mesh
 
 Which: TypeAlias = int | str
 """A shape of a collection, by its number or its name."""
+
+Both: TypeAlias = tuple[IntArray, IntArray]
+"""Maps between two cleaned meshes, there and back."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +106,7 @@ class MatchedCollection:
     method: Method
     refiner: Multistart
     reference_index: int
+    _kept: dict[tuple[int, int], Both] = field(default_factory=dict, init=False, repr=False)  # those of the reference
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -125,16 +133,16 @@ class MatchedCollection:
         """How it was made, in words."""
         k = self.bases.shape[-1]
         return (
-            f"{len(self.names)} shapes, {len(self.edges)} pairs of them matched by several starts; {len(self.mended)} "
-            f"of these maps did not agree with the others and were replaced; functional maps of {k} functions that "
-            f"close every cycle, refined jointly with the descriptor to {self.refiner.schedule[-1]}"
+            f"{len(self.names)} shapes, {counted(len(self.edges), 'pair')} of them matched by several starts; "
+            f"{len(self.mended)} of these maps did not agree with the others and were replaced; functional maps of {k} "
+            f"functions that close every cycle, refined jointly with the descriptor to {self.refiner.schedule[-1]}"
         )
 
     @cached_property
     def trusted(self) -> dict[str, float]:
         """Name -> share of each shape that has a trustworthy partner on the reference, see `Confidence.trusted`."""
-        names = [name for name in self.names if name != self.reference]
-        return {name: self.match(name, self.reference).confidence.trusted for name in names}
+        others = [i for i in range(len(self.names)) if i != self.reference_index]
+        return {self.names[i]: self._trusted(i, self.reference_index) for i in others}
 
     def number(self, which: Which) -> int:
         """Return the number of a shape; ConfigError if there is none of that number or name."""
@@ -153,18 +161,17 @@ class MatchedCollection:
     def match(self, source: Which, target: Which) -> Match:
         """Return the match of two shapes, with all that `csm.match` returns."""
         i, j = self.number(source), self.number(target)
+        if i > j:
+            return self.match(j, i).inverse
         described = self.members[i].described(), self.members[j].described()
-        pair = Pair.of(*described)
-        found = finest(self._matrix(i, j), pair, self.refiner.climb)
+        found = finest(self._matrix(i, j), Pair.of(*described), self.refiner.climb)
         rule = Refined(Nearest(), self.refiner)
         ways = both_ways_of(replace(found, text=self.text), rule, *described)
-        subjects = self.subjects[i], self.subjects[j]
-        return match_of(ways, subjects, described, self.method, rule)
+        return match_of(ways, (self.subjects[i], self.subjects[j]), described, self.method, rule)
 
     def vertex_map(self, source: Which, target: Which) -> VertexMap:
         """Return the vertex map of two shapes."""
-        i, j = self.number(source), self.number(target)
-        return self._given(i, j, both_maps(self._task(i, j))[0])
+        return self.vertex_maps([(source, target)], workers=0, progress=False)[0]
 
     def vertex_maps(
         self, pairs: Sequence[tuple[Which, Which]] | None = None, *, workers: int | None = None, progress: bool = True
@@ -183,15 +190,20 @@ class MatchedCollection:
         asked = permutations(range(len(self.names)), 2) if pairs is None else pairs
         wanted = [(self.number(source), self.number(target)) for source, target in asked]
         both = sorted({(min(pair), max(pair)) for pair in wanted})  # a pair gives the maps of both directions
-        tasks = [self._task(i, j) for i, j in both]
+        found = {pair: self._kept[pair] for pair in both if pair in self._kept}
+        missing = [pair for pair in both if pair not in found]
+        tasks = [self._task(*pair) for pair in missing]
         n = n_processes(workers, len(tasks)) if self.members[0].device == "cpu" else 0
         done = parallel_map(both_maps, tasks, EdgeTask.label_of, n, what="map", unit="pair", progress=progress)
-        found = {(i, j): there for (i, j), (there, _) in zip(both, done, strict=True)}
-        found |= {(j, i): back for (i, j), (_, back) in zip(both, done, strict=True)}
-        return [self._given(i, j, found[i, j]) for i, j in wanted]
+        found |= zip(missing, done, strict=True)
+        self._kept.update({pair: maps for pair, maps in found.items() if self.reference_index in pair})
+        return [self._given(i, j, found[i, j][0] if i <= j else found[j, i][1]) for i, j in wanted]
 
     def save(self, folder: str | os.PathLike[str], *, pairs: str = "auto", overwrite: bool = False) -> Path:
-        """Write what ``csm match folder=DIR`` writes: maps, coloured meshes, a page to look at and an account."""
+        """Write what ``csm match folder=DIR`` writes: maps, coloured meshes, a page to look at and an account.
+
+        Files that are as csm left them are replaced, others only with `overwrite`, and an input never: a DataError.
+        """
         saver: Callable[..., Path] = load("csm.viewer.collection_folder:save_collection")
         return saver(self, folder, pairs=pairs, overwrite=overwrite)
 
@@ -203,6 +215,16 @@ class MatchedCollection:
         maps = self._matrix(i, j)[None]
         return EdgeTask(self.members[i], self.members[j], self.refiner, maps.shape[-1], maps)
 
+    def _trusted(self, i: int, j: int) -> float:
+        """Return the share of shape i with a trustworthy partner on shape j, by the maps that are known of both."""
+        _ = self.vertex_map(i, j)
+        there, back = self._kept[min(i, j), max(i, j)][:: 1 if i < j else -1]
+        source, target = self.members[i].described(), self.members[j].described()
+        forward, backward = VertexMap(there, target.mesh.n_vertices), VertexMap(back, source.mesh.n_vertices)
+        found = confidence_of(Sides(source, target, forward, backward), start_of(Nearest(), source, target))
+        given = on_given(Way(forward, confidence=found), self.subjects[i], self.subjects[j])
+        return given.confidence.trusted if given.confidence else 0.0
+
     def _given(self, i: int, j: int, indices: IntArray) -> VertexMap:
         """Return a vertex map of cleaned meshes as one of the given meshes."""
         source, target = self.members[i].mesh, self.members[j].mesh
@@ -212,5 +234,5 @@ class MatchedCollection:
     def __repr__(self) -> str:
         return (
             f"MatchedCollection({len(self.names)} shapes by {self.method.name}, reference {self.reference}, "
-            f"{len(self.mended)} of {len(self.edges)} pairs mended)"
+            f"{len(self.mended)} of {counted(len(self.edges), 'pair')} mended)"
         )

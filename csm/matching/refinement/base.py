@@ -25,11 +25,14 @@ class RefinedMap:
         The way target -> source that belongs to it; None if the refiner makes none.
     text
         What was done, in words, with its figures.
+    ambiguous
+        Whether another map was found that is about as good: the shapes look the same in several ways.
     """
 
     forward: Way
     backward: Way | None = None
     text: str = ""
+    ambiguous: bool = False
 
 
 class Refiner(ABC):

@@ -16,6 +16,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from csm._counts import counted
 from csm._types import FloatArray, IntArray
 from csm.errors import ConfigError
 from csm.matching.barycentric import BarycentricMap, nearest_on_faces
@@ -160,7 +161,9 @@ def first_matrix(indices: IntArray, pair: Pair, k: int) -> Tensor:
     known = indices[samples.at] >= 0
     here = samples.at[known] if known.all() else np.flatnonzero(indices >= 0)
     if len(here) < k:
-        raise ConfigError(f"a map that is known at {len(here)} vertices cannot be refined; wanted {k} at least")
+        raise ConfigError(
+            f"a map that is known at {counted(len(here), 'vertex')} cannot be refined; wanted {k} at least"
+        )
     areas = samples.areas if known.all() else pair.source.areas[here]
     return least_squares(pair, here, torch.from_numpy(indices[here]).to(areas.device), areas, k)
 
@@ -210,4 +213,5 @@ def way_between(
 
 
 def _text(sizes: Sequence[int]) -> str:
-    return f"refined jointly with the descriptor in {len(sizes)} steps, to functional maps of {sizes[-1]} functions"
+    steps = counted(len(sizes), "step")
+    return f"refined jointly with the descriptor in {steps}, to functional maps of {sizes[-1]} functions"

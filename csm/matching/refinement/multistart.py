@@ -7,17 +7,21 @@ alone and applied to the functional map of the descriptor's nearest neighbours. 
 hundred samples, guided by the descriptor and, against mirrored maps, by the orientation of the surfaces
 (`csm.matching.orientation`).  The best that differ go on to finer functional maps at more samples, and the one that
 then keeps areas, lengths and the descriptor best (`Scores.total`) climbs to all vertices.
+
+Where another of them, clearly different, is nearly that of an isometry as well, the shapes look the same in several
+ways (`Solutions.ambiguous`): a torus turned about its axis, a sheet turned by half, a body and its mirror image.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import ClassVar
 
 import torch
 from torch import Tensor
 
+from csm._counts import counted
 from csm.errors import ConfigError
 from csm.matching.base import Described
 from csm.matching.maps import VertexMap
@@ -32,6 +36,10 @@ _KEPT = 32  # starts that these are made with, the best ones so far
 _FINAL_SAMPLES = 1000  # vertices of each shape that the choice is made at
 _FINAL = (30, 40, 60, 100)  # sizes of the functional maps before the choice
 _APART = 0.5  # |C - C'| / sqrt(K) from which two functional maps are different maps
+_CLEARLY_APART = 1.0  # the same, of a map that is another symmetry; unrelated orthogonal maps have 1.41
+_ISOMETRIC = 0.35  # stretch and commutation up to which a map is nearly an isometry
+_TIED, _ISOMETRIC_TIED = 0.01, 0.5  # the same, of a map whose sum of scores is that of the best up to the first
+_DESCRIBED = 0.5  # how much worse the descriptor may be kept, whose total variance is 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +61,40 @@ class Solutions:
     def best(self) -> int:
         """Number of the one to take."""
         return int(self.scores.total.argmin())
+
+    @property
+    def ambiguous(self) -> bool:
+        """Whether a map that is clearly another one than the best could be the right one as well.
+
+        Its stretch and commutation are nearly those of an isometry.  Symmetric shapes, meshed alike or not, have such
+        maps at 0.14 to 0.34, coarse ones up to 0.5 with scores that tie; the best other map of 30 pairs of humans and
+        animals was at 0.42 and more, and 0.05 worse than the best in the sum of its scores.
+        """
+        best, judged = self.best, self.scores
+        apart = (self.matrices - self.matrices[best]).flatten(1).norm(dim=1) / self.matrices.shape[-1] ** 0.5
+        most = torch.where(judged.total <= judged.total[best] + _TIED, _ISOMETRIC_TIED, _ISOMETRIC)
+        isometric = judged.stretch + judged.commutation <= most
+        described = judged.descriptor <= judged.descriptor[best] + _DESCRIBED
+        return bool(((apart >= _CLEARLY_APART) & isometric & described).any())
+
+
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """The start that is made fine.
+
+    Parameters
+    ----------
+    matrix
+        Its functional map, (K, K) for the first K of the schedule.
+    text
+        What was done, in words.
+    ambiguous
+        See `Solutions.ambiguous`.
+    """
+
+    matrix: Tensor
+    text: str
+    ambiguous: bool
 
 
 @dataclass(frozen=True)
@@ -114,21 +156,22 @@ class Multistart(Refiner):
     def __call__(self, start: VertexMap, source: Described, target: Described) -> RefinedMap:
         """Return the refined map of the best start."""
         pair = Pair.of(source, target)
-        matrix, text = self.search(start, pair)
-        return finished(self.climb(matrix, pair), pair, self.climb, start, text)
+        chosen = self.search(start, pair)
+        done = finished(self.climb(chosen.matrix, pair), pair, self.climb, start, chosen.text)
+        return replace(done, ambiguous=chosen.ambiguous)
 
-    def search(self, start: VertexMap, pair: Pair) -> tuple[Tensor, str]:
-        """Return the functional map of the best start, (K, K) for the first K of the schedule, and what was done."""
+    def search(self, start: VertexMap, pair: Pair) -> Chosen:
+        """Return the best start."""
         starts = self.starts(first_matrix(start.indices, pair, min(pair.k, self.first)))
         found = self.solutions(starts, pair)
         best, judged = found.best, found.scores
         text = (
-            f"the best of {len(starts)} starts and {_counted(len(found.matrices))} of them (stretch "
-            f"{float(judged.stretch[best]):.2f}, commutation {float(judged.commutation[best]):.2f}, descriptor "
-            f"{float(judged.descriptor[best]):.2f}), refined jointly with the descriptor to functional maps of "
-            f"{self.climb.sizes(pair.k)[-1]} functions"
+            f"the best of {counted(len(starts), 'start')} and {counted(len(found.matrices), 'map', 'different maps')} "
+            f"of them (stretch {float(judged.stretch[best]):.2f}, commutation {float(judged.commutation[best]):.2f}, "
+            f"descriptor {float(judged.descriptor[best]):.2f}), refined jointly with the descriptor to functional maps "
+            f"of {self.climb.sizes(pair.k)[-1]} functions"
         )
-        return found.matrices[best], text
+        return Chosen(found.matrices[best], text, found.ambiguous)
 
     def solutions(self, starts: Tensor, pair: Pair) -> Solutions:
         """Refine functional maps to begin with, (B, K, K), and return the best that differ, see `finals`."""
@@ -170,10 +213,6 @@ class Multistart(Refiner):
         for size in sizes[n_guided:]:
             maps = step(matrices_of(maps, sampled, size), sampled, free)
         return maps
-
-
-def _counted(n: int) -> str:
-    return "one map" if n == 1 else f"{n} different maps"
 
 
 def _different(matrices: Tensor, most: int) -> Tensor:

@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from csm._counts import counted
 from csm._types import IntArray
 from csm.errors import ConfigError
 from csm.matching.base import Described
@@ -36,15 +37,13 @@ def zoomout_sizes(first: int, last: int, step: int, k: int) -> list[int]:
 
 
 @dataclass(frozen=True)
-class ZoomOut(Refiner):
-    """ZoomOut (Melzi et al. 2019, equations 1 and 2): functional maps of growing size, the descriptor only at first.
+class Growing(Refiner):
+    """A refiner whose functional maps grow.
 
     Parameters
     ----------
     first, last, step
         Sizes of the functional maps.
-    samples
-        Vertices of each shape that all steps but the last are computed on (section 4.3 of the paper); 0 for all.
 
     Raises
     ------
@@ -55,18 +54,46 @@ class ZoomOut(Refiner):
     first: int = 20
     last: int = 200
     step: int = 10
+
+    def __post_init__(self) -> None:
+        if not (2 <= self.first <= self.last and self.step >= 1):
+            raise ConfigError(f"{self}: wanted 2 <= first <= last and step >= 1")
+
+    def sizes(self, k: int) -> list[int]:
+        """Return the sizes that `k` eigenfunctions allow, see `zoomout_sizes`."""
+        return zoomout_sizes(self.first, self.last, self.step, k)
+
+
+@dataclass(frozen=True)
+class ZoomOut(Growing):
+    """ZoomOut (Melzi et al. 2019, equations 1 and 2): functional maps of growing size, the descriptor only at first.
+
+    Parameters
+    ----------
+    first, last, step
+        See `Growing`.
+    samples
+        Vertices of each shape that all steps but the last are computed on (section 4.3 of the paper); 0 for all.
+
+    Raises
+    ------
+    ConfigError
+        If a parameter is out of its range.
+    """
+
     samples: int = 2500
 
     name: ClassVar[str] = "zoomout"
 
     def __post_init__(self) -> None:
-        if not (2 <= self.first <= self.last and self.step >= 1 and self.samples >= 0):
-            raise ConfigError(f"{self}: wanted 2 <= first <= last, step >= 1 and samples >= 0")
+        super().__post_init__()
+        if self.samples < 0:
+            raise ConfigError(f"{self}: wanted samples >= 0")
 
     def __call__(self, start: VertexMap, source: Described, target: Described) -> RefinedMap:
         """Return the refined map."""
         pair = Pair.of(source, target)
-        sizes = zoomout_sizes(self.first, self.last, self.step, pair.k)
+        sizes = self.sizes(pair.k)
         matrix = first_matrix(start.indices, pair, sizes[0])
         here, areas = _drawn(pair, self.samples)
         there = _drawn(pair.reversed, self.samples)[0]
@@ -74,7 +101,7 @@ class ZoomOut(Refiner):
         for size in sizes[1:]:
             queries, rows = adjoint_rows(matrix, pair)
             matrix = least_squares(pair, here, candidates[nearest_rows(queries[here], rows[there])], areas, size)
-        text = f"refined by ZoomOut in {len(sizes)} steps, to functional maps of {sizes[-1]} functions"
+        text = f"refined by ZoomOut in {counted(len(sizes), 'step')}, to functional maps of {sizes[-1]} functions"
         return _result(matrix, pair, start, text, both=False)
 
 
@@ -112,45 +139,30 @@ class ICP(Refiner):
         for _ in range(self.iterations):
             queries, rows = adjoint_rows(matrix, pair)
             matrix = orthogonal(least_squares(pair, everywhere, nearest_rows(queries, rows), pair.source.areas, k))
-        text = f"refined by {self.iterations} rounds of ICP with functional maps of {k} functions"
+        text = f"refined by {counted(self.iterations, 'round')} of ICP with functional maps of {k} functions"
         return _result(matrix, pair, start, text, both=True)
 
 
 @dataclass(frozen=True)
-class Bijective(Refiner):
+class Bijective(Growing):
     """ZoomOut of the maps in both directions together (Ren et al. 2021, "Discrete Optimization for Shape Matching").
 
     Each step makes a functional map of both vertex maps, the second of them against its direction, so that they agree.
-
-    Parameters
-    ----------
-    first, last, step
-        Sizes of the functional maps.
-
-    Raises
-    ------
-    ConfigError
-        If a parameter is out of its range.
     """
 
-    first: int = 20
-    last: int = 200
-    step: int = 10
-
     name: ClassVar[str] = "bijective"
-
-    def __post_init__(self) -> None:
-        if not (2 <= self.first <= self.last and self.step >= 1):
-            raise ConfigError(f"{self}: wanted 2 <= first <= last and step >= 1")
 
     def __call__(self, start: VertexMap, source: Described, target: Described) -> RefinedMap:
         """Return the refined maps of both directions."""
         pair = Pair.of(source, target)
-        sizes = zoomout_sizes(self.first, self.last, self.step, pair.k)
+        sizes = self.sizes(pair.k)
         matrix = first_matrix(start.indices, pair, sizes[0])
         for size in sizes[1:]:
             matrix = _agreeing(*_to_and_fro(matrix, pair), pair, size)
-        text = f"refined by bijective ZoomOut in {len(sizes)} steps, to functional maps of {sizes[-1]} functions"
+        text = (
+            f"refined by bijective ZoomOut in {counted(len(sizes), 'step')}, to functional maps of {sizes[-1]} "
+            "functions"
+        )
         return _result(matrix, pair, start, text, both=True)
 
 

@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from csm._counts import counted
 from csm.errors import MeshError
 from csm.mesh.io.raw import RawMesh
 
@@ -28,7 +29,8 @@ def chosen(names: Sequence[str], choose: Choice) -> list[int]:
     shown = ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
     if choose is None:
         raise MeshError(
-            f"it holds {len(names)} shapes ({shown}), wanted one; choose it by its number from 0 to {len(names) - 1}, "
+            f"it holds {counted(len(names), 'shape')} ({shown}), wanted one; choose it by its number from 0 to "
+            f"{len(names) - 1}, "
             'as in csm.read_mesh(..., choose=0) or csm clean FILE OUT choose=0, or choose="all" to join them'
         )
     try:
@@ -36,7 +38,9 @@ def chosen(names: Sequence[str], choose: Choice) -> list[int]:
     except TypeError:
         number = -1
     if not 0 <= number < len(names):
-        raise MeshError(f"there is no choose={choose!r}: it holds {len(names)} shapes ({shown}), counted from 0")
+        raise MeshError(
+            f"there is no choose={choose!r}: it holds {counted(len(names), 'shape')} ({shown}), counted from 0"
+        )
     return [number]
 
 

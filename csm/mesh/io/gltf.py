@@ -15,10 +15,11 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
+from csm._counts import counted
 from csm._types import FloatArray, IntArray
 from csm.errors import MeshError
 from csm.mesh.io.choice import Choice, chosen, joined
-from csm.mesh.io.raw import RawMesh, strip_triangles
+from csm.mesh.io.raw import RawMesh, strip_triangles, unread
 
 Fetch: TypeAlias = Callable[[str], bytes]
 """Reads a file that lies beside the .gltf file."""
@@ -54,7 +55,7 @@ def parse_gltf(data: bytes, choose: Choice, fetch: Fetch) -> RawMesh:
     file = GltfFile(document, binary, fetch)
     shapes, skipped = shapes_of(document)
     if skipped:
-        notes.append(f"{skipped} parts of points or lines were skipped")
+        notes.append(f"{counted(skipped, 'part of points or lines was', 'parts of points or lines were')} skipped")
     if not shapes:
         raise MeshError("it holds no mesh of triangles")
     picked = chosen([shape.name for shape in shapes], choose)
@@ -72,7 +73,7 @@ def document_of(data: bytes) -> tuple[dict[str, Any], bytes, list[str]]:
         if length > len(data):
             raise MeshError(f"the head announces {length} bytes, but the file has {len(data)}: it is cut short")
         if length < len(data):
-            notes.append(f"{len(data) - length} bytes follow its end; they were not read")
+            notes.append(unread(len(data) - length, "byte", "its end"))
         chunks = dict(reversed(list(_chunks(data[:length]))))
         data, binary = chunks.get(b"JSON", b""), chunks.get(b"BIN\0", b"")
     try:

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from csm.errors import CsmError, DataError, MeshError
+from csm.errors import ConfigError, CsmError, DataError, MeshError
 
 LARGEST_FILE = 8 << 30
 """Bytes; a larger file is refused before it is opened."""
@@ -33,14 +33,26 @@ def refusals(path: str | os.PathLike[str], doing: str = "read") -> Iterator[None
     """Turn what the system says of a path into a `DataError` that names it as it was given."""
     try:
         yield
-    except FileNotFoundError:
-        raise DataError(f"{path}: there is no such file") from None
     except MemoryError:
         raise DataError(f"{path}: cannot be {doing}: there is not enough memory") from None
     except OSError as error:
+        if doing == "read" and isinstance(error, FileNotFoundError):
+            raise DataError(f"{path}: there is no such file") from None
         raise DataError(f"{path}: cannot be {doing} ({error.strerror or error})") from error
     except ValueError as error:  # a name with a zero byte
         raise DataError(f"{str(path)!r}: cannot be {doing} ({error})") from error
+
+
+def require_path_and(path: object, thing: object, kind: type, call: str) -> None:
+    """Raise a ConfigError unless a writer is given a path and what it writes, in this order."""
+    if isinstance(path, str | os.PathLike) and isinstance(thing, kind):
+        return
+    swapped = isinstance(thing, str | os.PathLike) and isinstance(path, kind)
+    raise ConfigError(
+        f"{call} got a {type(path).__name__} and a {type(thing).__name__}"
+        f"{', the other way round' if swapped else ''}; wanted the path first and then a csm {kind.__name__}, as in "
+        f"{call}('out.obj', {kind.__name__.lower()})"
+    )
 
 
 def require_regular(path: str | os.PathLike[str]) -> int:

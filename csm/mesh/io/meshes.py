@@ -17,13 +17,13 @@ from csm.errors import ConfigError, DataError, MeshError
 from csm.mesh.io.choice import Choice
 from csm.mesh.io.files import atomic_path, read_bytes, read_bytes_of_head
 from csm.mesh.io.gltf import Fetch, parse_gltf
-from csm.mesh.io.guard import inflate, most_unpacked, parsing
+from csm.mesh.io.guard import inflate, most_unpacked, parsing, require_path_and
 from csm.mesh.io.matlab import parse_mat
 from csm.mesh.io.npz import parse_npz
 from csm.mesh.io.obj import format_obj, parse_obj
 from csm.mesh.io.off import count_off, format_off, parse_off
 from csm.mesh.io.ply import counts_ply, format_ply, parse_ply
-from csm.mesh.io.raw import RawMesh
+from csm.mesh.io.raw import RawMesh, unread
 from csm.mesh.io.stl import parse_stl
 from csm.mesh.io.vtk import parse_vtk
 from csm.mesh.polygons import PolygonMesh
@@ -139,7 +139,7 @@ def _parsed(data: bytes, path: str, suffix: str, choose: Choice) -> RawMesh:
     notes: tuple[str, ...] = ()
     if path.lower().endswith(".gz"):
         data, left = inflate(data, limit=most_unpacked(len(data)))
-        notes = (f"{left} bytes follow the compressed data; they were not read",) if left else ()
+        notes = (unread(left, "byte", "the compressed data"),) if left else ()
     if suffix in _SEVERAL:
         raw = _SEVERAL[suffix](data, choose, lambda name: read_bytes(Path(path).parent / name))
     elif choose in (None, 0, "all"):
@@ -178,17 +178,20 @@ def write_mesh(path: str | os.PathLike[str], mesh: Mesh, colors: NDArray[Any] | 
     path
         The file; its suffix chooses the format.
     mesh
-        What to write.
+        What to write; `csm.mesh.as_mesh` makes it of arrays and of objects of other libraries.
     colors
         Shape (N, 3), uint8 red, green, blue per vertex; .ply and .off only.
 
     Raises
     ------
+    ConfigError
+        If it is no path and mesh, or the two are exchanged.
     MeshError
         If the suffix cannot be written or the colours do not fit.
     DataError
         If the file cannot be written there.
     """
+    require_path_and(path, mesh, Mesh, "write_mesh")
     suffix = Path(path).suffix.lower()
     if suffix not in WRITABLE:
         raise MeshError(f"{path}: csm does not write {suffix or 'files without a suffix'}; wanted {_list(WRITABLE)}")

@@ -8,9 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from csm._counts import counted
 from csm._types import IntArray
 from csm.errors import MeshError
-from csm.mesh.io.raw import RawMesh, coordinates, decode
+from csm.mesh.io.raw import RawMesh, coordinates, decode, unread
 from csm.mesh.shape import Mesh
 
 # The optional prefixes (texture, colour, normal) only add columns after x y z.  ModelNet glues the counts to "OFF".
@@ -83,12 +84,13 @@ def _by_lines(rows: list[list[str]]) -> RawMesh:
     end = n_vertices + n_faces
     if len(rows) < end:
         raise MeshError(
-            f"the header announces {n_vertices} vertices and {n_faces} faces, but only {len(rows)} lines follow: "
+            f"the header announces {counted(n_vertices, 'vertex')} and {counted(n_faces, 'face')}, but only "
+            f"{counted(len(rows), 'line follows', 'lines follow')}: "
             "the file is cut short"
         )
     vertices = coordinates(rows[:n_vertices])
     corners, sizes = _faces(rows[n_vertices:end])
-    notes = (f"{len(rows) - end} lines follow the last face; they were not read",) if len(rows) > end else ()
+    notes = (unread(len(rows) - end, "line", "the last face"),) if len(rows) > end else ()
     return RawMesh(vertices, corners, sizes, notes)
 
 

@@ -7,6 +7,7 @@ import codecs
 import numpy as np
 from numpy.typing import NDArray
 
+from csm._counts import counted
 from csm.errors import MeshError
 from csm.mesh.io.ply_header import read_header
 from csm.mesh.io.ply_rows import Column, read_elements
@@ -40,7 +41,10 @@ def parse_ply(data: bytes) -> RawMesh:
     if "tristrips" in tables:
         column = _indices(tables["tristrips"], "tristrips")
         triangles, left_out = strip_triangles(whole_numbers(column.values, "strips"), column.sizes)
-        notes.append(f"{len(triangles)} triangles were taken from {len(column.sizes)} triangle strips")
+        notes.append(
+            f"{counted(len(triangles), 'triangle was', 'triangles were')} taken from "
+            f"{counted(len(column.sizes), 'triangle strip')}"
+        )
         if left_out:
             notes[-1] += f"; {left_out} that name a vertex twice only join strips and were left out"
         corners = np.concatenate([corners, triangles.ravel()])

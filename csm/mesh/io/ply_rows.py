@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from csm._types import IntArray
 from csm.errors import MeshError
 from csm.mesh.io.ply_header import Element, Header, Property
-from csm.mesh.io.raw import is_number
+from csm.mesh.io.raw import is_number, unread
 
 
 @dataclass(frozen=True)
@@ -46,14 +46,14 @@ def read_elements(data: bytes, header: Header, wanted: Sequence[str]) -> tuple[d
             if element.name in wanted:
                 tables[element.name] = _ascii_columns(element, rows[:used])
             rows = rows[used:]
-        return tables, f"{len(rows)} lines follow the last element; they were not read" if rows else ""
+        return tables, unread(len(rows), "line", "the last element") if rows else ""
     at = header.start
     for element in header.elements:
         columns, at = _binary_columns(element, data, at, header.order)
         if element.name in wanted:
             tables[element.name] = columns
     left = len(data) - at
-    return tables, f"{left} bytes follow the last element; they were not read" if left else ""
+    return tables, unread(left, "byte", "the last element") if left else ""
 
 
 def _ascii_columns(element: Element, rows: list[list[str]]) -> dict[str, Column]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from csm._counts import counted
 from csm._types import FloatArray, IntArray
 from csm.errors import MeshError
 
@@ -111,3 +112,14 @@ def is_number(word: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def unread(n: int, unit: str, after: str) -> str:
+    """Return the note on what follows the end of a file's content.
+
+    Examples
+    --------
+    >>> unread(1, "line", "the last face")
+    '1 line follows the last face; it was not read'
+    """
+    return counted(n, f"{unit} follows {after}; it was not read", f"{unit}s follow {after}; they were not read")

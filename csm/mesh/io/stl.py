@@ -6,7 +6,7 @@ import numpy as np
 
 from csm._types import FloatArray
 from csm.errors import MeshError
-from csm.mesh.io.raw import RawMesh, coordinates, decode
+from csm.mesh.io.raw import RawMesh, coordinates, decode, unread
 
 _HEAD = 84
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -58,7 +58,7 @@ def _parse_binary(data: bytes) -> RawMesh:
         count = whole
         notes = (f"the head announces {announced} triangles, but {whole} are there; all of them were read",)
     elif left:
-        notes = (f"{left} bytes follow the last triangle; they were not read",)
+        notes = (unread(left, "byte", "the last triangle"),)
     if count == 0:
         raise MeshError("it holds no triangle: an empty or damaged STL file")
     facets = np.frombuffer(data, _FACET, count, _HEAD)

@@ -13,7 +13,7 @@ from csm.mesh.io._gltf_texture import format_glb, parse_gltf_texture
 from csm.mesh.io._obj_texture import format_mtl, format_obj_texture, of_triangles, parse_mtl, parse_obj_texture
 from csm.mesh.io.choice import Choice
 from csm.mesh.io.files import atomic_path, read_bytes
-from csm.mesh.io.guard import parsing
+from csm.mesh.io.guard import parsing, require_path_and
 from csm.mesh.io.meshes import read_polygons
 from csm.mesh.polygons import triangulated
 from csm.mesh.textured import Image, Textured
@@ -106,11 +106,14 @@ def write_textured(path: str | os.PathLike[str], texture: Textured) -> tuple[Pat
 
     Raises
     ------
+    ConfigError
+        If it is no path and textured mesh, or the two are exchanged.
     MeshError
         If the suffix is another one.
     DataError
         If a file cannot be written, or a file with other content than ours has the name of the .mtl file or an image.
     """
+    require_path_and(path, texture, Textured, "write_textured")
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in (".obj", ".glb"):

@@ -7,6 +7,7 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
+from csm._counts import counted
 from csm._types import IntArray
 from csm.errors import MeshError
 from csm.mesh.io.raw import RawMesh, strip_triangles
@@ -166,10 +167,13 @@ class _Reader:
         skipped = sum(len(self.cells[key][1]) for key in ("VERTICES", "LINES") if key in self.cells)
         if "CELLS" in self.cells:
             corners, sizes, strips, skipped = self.flat_cells()
-        notes = [f"{skipped} points and lines were skipped"] if skipped else []
+        notes = [f"{counted(skipped, 'point or line was', 'points and lines were')} skipped"] if skipped else []
         triangles, left_out = strip_triangles(*strips)
         if len(strips[1]):
-            notes.append(f"{len(triangles)} triangles were taken from {len(strips[1])} triangle strips")
+            notes.append(
+                f"{counted(len(triangles), 'triangle was', 'triangles were')} taken from "
+                f"{counted(len(strips[1]), 'triangle strip')}"
+            )
             notes[-1] += f"; {left_out} that name a vertex twice were left out" if left_out else ""
         corners = np.concatenate([corners, triangles.ravel()])
         return RawMesh(self.points, corners, np.concatenate([sizes, np.full(len(triangles), 3)]), tuple(notes))

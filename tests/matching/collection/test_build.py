@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 
 import csm
-from csm.errors import ConfigError, DataError
+from csm.errors import ConfigError
 from csm.matching.collection import build
-from csm.matching.collection.build import match_collection, medoid, mesh_files, named_shapes, unlikeness
+from csm.matching.collection.build import match_collection, medoid, unlikeness
 from csm.matching.collection.candidates import Candidates
 from csm.matching.collection.members import candidates_of
-from csm.mesh.io import write_mesh
 from tests.matching.collection.copies import QUICK, copies, share_right
-from tests.shapes import blob
 
 
 @pytest.fixture(scope="module")
@@ -45,28 +43,6 @@ def test_two_shapes_are_a_collection(store):
     assert found.names == ("shape0", "s1")
     assert len(found.edges) == 1
     assert share_right(found.vertex_map(0, 1).indices, 0, 1, 2) > 0.95
-
-
-def test_a_folder_is_read_in_natural_order_and_arrays_are_no_meshes_beside_meshes(tmp_path):
-    for name in ("b10.off", "b9.ply"):
-        write_mesh(tmp_path / name, blob(2))
-    np.savez(tmp_path / "values.npz", values=np.zeros(3))
-    (tmp_path / "notes.txt").write_text("no mesh")
-    assert [path.name for path in mesh_files(tmp_path)] == ["b9.ply", "b10.off"]
-    assert list(named_shapes(str(tmp_path))) == ["b9.ply", "b10.off"]
-
-
-def test_what_is_no_collection_is_named(tmp_path, store):
-    write_mesh(tmp_path / "a.off", blob(2))
-    with pytest.raises(DataError, match="gone: there is no such folder"):
-        match_collection(tmp_path / "gone")
-    with pytest.raises(DataError, match="has 1 mesh files, wanted two or more"):
-        match_collection(tmp_path)
-    with pytest.raises(ConfigError, match="a collection of 1 shapes"):
-        match_collection([blob(2)])
-    write_mesh(tmp_path / "a.ply", blob(2))
-    with pytest.raises(DataError, match=r"a\.ply and .*a\.off have one name, 'a'"):
-        match_collection(tmp_path, store=store)
 
 
 def test_unlike_shapes_are_far_and_like_ones_near():

@@ -37,6 +37,27 @@ def test_a_match_of_two_shapes_is_their_vertex_map_with_all_else(found):
     assert "close every cycle" in match.refinement
 
 
+def test_a_match_is_the_same_map_from_either_side(found):
+    match = found.match("s2", "s1")
+    assert (match.source.name, match.target.name) == ("s2", "s1")
+    for i, j in (("s2", "s1"), ("s1", "s2")):
+        assert np.array_equal(found.match(i, j).indices, found.vertex_map(i, j).indices)
+
+
+def test_the_trusted_share_is_that_of_the_match_and_takes_maps_that_are_there(found, monkeypatch):
+    names = [name for name in found.names if name != found.reference]
+    one_by_one = {name: found.match(name, found.reference).confidence.trusted for name in names}
+    found.vertex_maps([(name, found.reference) for name in names], workers=0, progress=False)
+
+    def again(*_):
+        raise AssertionError("a map is computed a second time")
+
+    monkeypatch.setattr("csm.matching.collection.result.both_maps", again)
+    monkeypatch.setattr("csm.matching.collection.result.finest", again)
+    assert found.trusted == one_by_one
+    assert min(one_by_one.values()) > 0.9
+
+
 def test_functional_maps_close_every_cycle_and_are_orthogonal(found):
     ab, bc, ca = (found.functional_map(*pair).matrix for pair in ((0, 1), (1, 2), (2, 0)))
     assert np.allclose(ab @ bc @ ca, np.eye(len(ab)), atol=1e-8)

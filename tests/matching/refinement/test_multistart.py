@@ -9,14 +9,17 @@ import numpy as np
 import pytest
 import torch
 
+from csm.data.store import Store
 from csm.errors import ConfigError
 from csm.matching.nearest import Nearest
-from csm.matching.refinement.multistart import Multistart
+from csm.matching.refinement.base import start_of
+from csm.matching.refinement.batch import Scores
+from csm.matching.refinement.multistart import Multistart, Solutions
 from csm.matching.refinement.pair import Pair
 from csm.mesh.shape import Mesh
 from csm.operators.geodesic import geodesics
-from tests.matching.pairs import as_map, described, known, mirrored, relabelled
-from tests.shapes import blob, plane, sphere
+from tests.matching.pairs import as_map, bent, described, known, mirrored, relabelled
+from tests.shapes import blob, cylinder, plane, sphere, torus
 
 
 def beside(one: Mesh, other: Mesh) -> Mesh:
@@ -64,8 +67,8 @@ def test_of_several_finalists_the_best_judged_is_taken(store):
 
     def judged(finalists: int) -> tuple[int, float]:
         """How many maps were compared, and the sum of the scores of the one that was taken."""
-        _, text = Multistart(finalists=finalists).search(found.start, pair)
-        maps = re.findall(r"(\d+) different maps|one map", text)[0]
+        text = Multistart(finalists=finalists).search(found.start, pair).text
+        maps = re.findall(r"(\d+) (?:different )?map", text)[0]
         return int(maps or 1), sum(map(float, re.findall(r"\d+\.\d+", text)))
 
     (n, alone), (several, best) = judged(1), judged(6)
@@ -129,3 +132,51 @@ def test_a_graphics_card_gives_the_same_map(store):
     source, target = (replace(each, features=each.features.cuda()) for each in (found.source, found.target))
     assert source.embedded.evecs.is_cuda
     assert (Multistart()(found.start, source, target).forward.vertex_map.indices == made).mean() > 0.98
+
+
+def star(points: int = 5) -> Mesh:
+    """A flat closed star with that many arms."""
+    x = sphere(4).vertices
+    out = 1 + 0.45 * np.cos(points * np.arctan2(x[:, 1], x[:, 0])) * np.hypot(x[:, 0], x[:, 1]) ** points
+    return Mesh(np.stack([x[:, 0] * out, x[:, 1] * out, 0.35 * x[:, 2]], 1), sphere(4).faces, "star")
+
+
+SYMMETRIC = {"torus": torus(), "tube": cylinder(), "sphere": sphere(3), "star": star()}
+
+
+def ambiguous(source: Mesh, target: Mesh, store: Store) -> bool:
+    here, there = described(source, store), described(target, store)
+    return Multistart().search(start_of(Nearest(), here, there), Pair.of(here, there)).ambiguous
+
+
+@pytest.mark.parametrize("name", SYMMETRIC)
+def test_symmetric_shapes_are_known_to_look_the_same_in_several_ways(store, name):
+    mesh = SYMMETRIC[name]
+    assert ambiguous(mesh, relabelled(mesh)[0], store)
+
+
+def test_symmetric_shapes_are_known_in_another_triangulation(store):
+    assert ambiguous(torus(), torus(minor=0.42, n=34, m=18), store)
+    assert ambiguous(plane(30), plane(30, seed=3), store)
+
+
+def test_shapes_that_fit_in_one_way_are_not_called_ambiguous(store, small_humans):
+    here, there = (shape.mesh for shape in small_humans)
+    mesh = blob()
+    for source, target in ((here, there), (here, here), (mesh, relabelled(mesh)[0]), (mesh, bent(mesh)), (here, mesh)):
+        assert not ambiguous(source, target, store), (source, target)
+
+
+def test_another_map_counts_only_if_it_is_clearly_another_and_an_isometry():
+    maps = torch.stack([torch.eye(30), torch.diag((-1.0) ** torch.arange(30)), torch.eye(30)])
+    maps[2, 0, 0] = -1
+
+    def found(of_second: float, of_third: float, descriptor: float = 0.2, best: float = 0.1) -> Solutions:
+        parts = torch.tensor([best / 2, of_second / 2, of_third / 2])
+        return Solutions(maps, Scores(parts, parts, torch.tensor([0.1, descriptor, 0.1])))
+
+    assert found(0.3, 0.9).ambiguous
+    assert not found(0.4, 0.9).ambiguous, "no isometry"
+    assert found(0.4, 0.9, best=0.4, descriptor=0.105).ambiguous, "a tie"
+    assert not found(0.3, 0.9, descriptor=0.7).ambiguous, "the descriptor tells them apart"
+    assert not found(0.9, 0.1).ambiguous, "the third is the first, nearly"

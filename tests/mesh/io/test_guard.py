@@ -10,7 +10,7 @@ import pytest
 from csm.errors import DataError, MeshError
 from csm.mesh.io import read_bytes, read_labels, read_mesh, read_names, read_pairs
 from csm.mesh.io.files import read_bytes_of_head
-from csm.mesh.io.guard import inflate, parsing, require_regular
+from csm.mesh.io.guard import inflate, parsing, refusals, require_regular
 
 READERS = {
     "read_bytes": read_bytes,
@@ -113,3 +113,10 @@ def test_errors_name_the_file_as_given(tmp_path, monkeypatch):
         with pytest.raises(MeshError) as caught:
             read_mesh(given)
         assert str(caught.value).startswith(given + ": ")
+
+
+def test_what_is_not_there_is_told_of_reading_and_of_writing_in_other_words(tmp_path):
+    gone = tmp_path / "gone" / "a"
+    for doing, said in (("read", "there is no such file"), ("written", r"cannot be written \(No such file")):
+        with pytest.raises(DataError, match=f"a: {said}"), refusals(gone, doing):
+            gone.mkdir()

@@ -79,7 +79,7 @@ def test_source_and_notes_of_a_mesh(tmp_path):
     (tmp_path / "a.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n9 9 9\n")
     mesh = read_mesh(str(tmp_path / "a.off"))
     assert mesh.source == str(tmp_path / "a.off")
-    assert mesh.notes == ("1 lines follow the last face; they were not read",)
+    assert mesh.notes == ("1 line follows the last face; it was not read",)
 
 
 @pytest.mark.parametrize("suffix", WRITABLE)

@@ -108,7 +108,7 @@ def test_faces_and_strips_add_up_and_that_is_noted():
         made("ascii", {"vertex": XYZ, "face": [(lists, [[5, 6, 7]])], "tristrips": [(lists, [[0, 1, 2, 3]])]})
     )
     assert raw.faces.tolist() == [[5, 6, 7], [0, 1, 2], [2, 1, 3]]
-    assert raw.notes == ("2 triangles were taken from 1 triangle strips",)
+    assert raw.notes == ("2 triangles were taken from 1 triangle strip",)
 
 
 CASES = Path(__file__).parents[2] / "cases"

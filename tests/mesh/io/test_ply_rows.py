@@ -44,9 +44,12 @@ def test_polygons_are_kept_with_their_corners(form):
 
 
 def test_what_follows_the_last_element_is_a_note():
-    for form, unit in (("ascii", "1 lines"), ("binary_little_endian", "4 bytes")):
+    for form, said in (
+        ("ascii", "1 line follows the last element; it was not read"),
+        ("binary_little_endian", "4 bytes follow the last element; they were not read"),
+    ):
         data = made(form, {"vertex": XYZ, "face": [("list uchar int vertex_indices", FACES)]}) + b"rest"
-        assert parse_ply(data).notes == (f"{unit} follow the last element; they were not read",)
+        assert parse_ply(data).notes == (said,)
 
 
 def test_blank_lines_count_for_nothing():

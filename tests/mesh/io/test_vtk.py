@@ -80,7 +80,7 @@ def test_cells_of_every_flat_kind(binary):
     raw = parse_vtk(file("DATASET UNSTRUCTURED_GRID", *POINTS, *parts, binary=binary))
     assert raw.sizes.tolist() == [3, 4, 4, 5, 3, 3]
     assert raw.corners.tolist() == [0, 1, 2, 0, 1, 2, 3, 4, 5, 7, 6, 0, 1, 2, 3, 4, 0, 1, 2, 2, 1, 3]
-    assert raw.notes == ("1 points and lines were skipped", "2 triangles were taken from 1 triangle strips")
+    assert raw.notes == ("1 point or line was skipped", "2 triangles were taken from 1 triangle strip")
 
 
 WRONG_OFFSETS = (*OFFSETS[:2], (">i8", np.zeros(M + 1)), *OFFSETS[3:])
