@@ -32,6 +32,10 @@ SPLIT = Split(
     "faust_80_20", NAMES[:80], NAMES[80:], "The paper, section 5: the first 80 registrations train, the last 20 test"
 )
 
+HELD_OUT = Split(
+    "faust_held_out", NAMES[:60], NAMES[60:80], "csm: persons 6 and 7 of the training shapes, to choose settings on"
+)
+
 
 def _registrations(layout: Layout, folder: Path) -> FolderSet | None:
     """Find `training/registrations/tr_reg_000.ply` to `099.ply`, from any folder above or from `registrations`."""
@@ -137,7 +141,7 @@ class FaustDataModule(DataModule):
         **options: Any,
     ) -> None:
         sets = {n: find_set(root, *names_of(n)) for n in (train, *test)}
-        super().__init__(sets[train], [sets[n] for n in test], as_split(split, [SPLIT]), **options)
+        super().__init__(sets[train], [sets[n] for n in test], as_split(split, [SPLIT, HELD_OUT]), **options)
 
 
 def names_of(n_vertices: int) -> tuple[str, ...]:
@@ -151,4 +155,4 @@ def names_of(n_vertices: int) -> tuple[str, ...]:
     return ("FAUST_6890", "FAUST_MPI") if n_vertices == N_VERTICES else (f"FAUST_{n_vertices}",)
 
 
-DATA_SET = DataSet(FaustDataModule, (MPI, RELEASE, SGA18, LPS), (SPLIT,))
+DATA_SET = DataSet(FaustDataModule, (MPI, RELEASE, SGA18, LPS), (SPLIT, HELD_OUT))
