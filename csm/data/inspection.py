@@ -249,7 +249,7 @@ def _pair_problems(shapes: ShapeSet, data: DataModule) -> list[Problem]:
     if max(tested.values(), default=0) > 1:
         return []
     text = (
-        f"split {data.split.name} leaves {sum(tested.values())} test shapes with known correspondence, of which no two "
-        "make a pair to be tested; wanted two or more (such as data.n_test=2), or no test (test=false)"
+        f"split {data.split.name} leaves {counted(tested.total(), 'test shape')} with known correspondence, and no two "
+        "that make a pair to be tested; wanted two or more (such as data.n_test=2), or no test (test=false)"
     )
     return [Problem(shapes.name, "", "", "no_pairs", "error", text)]

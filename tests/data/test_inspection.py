@@ -119,7 +119,7 @@ def test_where_exact_distances_cannot_be_measured_is_said(toys):
 def test_what_a_split_leaves_is_told_before_the_training(toys):
     assert kinds(module(toys, n_test=1)) == [("", "no_pairs", "error")]
     assert kinds(module(toys, n_test=1), test=False) == []
-    with pytest.raises(DataError, match=r"toys: split toys leaves 1 test shapes .* make a pair .*data\.n_test=2"):
+    with pytest.raises(DataError, match=r"toys: split toys leaves 1 test shape .* make a pair .*data\.n_test=2"):
         require_sound(module(toys, n_test=1), progress=False)
     missing = Split("mine", ("toy0", "toy1"), ("toy2", "toy9"))
     assert kinds(module(toys, split=missing)) == [("", "missing", "error"), ("", "no_pairs", "error")]

@@ -71,10 +71,12 @@ def test_a_barycentric_map_is_used_where_there_is_one(match):
     np.testing.assert_allclose(finer.transfer(TARGET.vertices), precise.points(TARGET))
 
 
-def test_a_match_is_saved_once_unless_told_otherwise(match, tmp_path):
+def test_a_match_is_saved_over_its_own_files_and_over_others_only_when_told_to(match, tmp_path):
     folder = match.save(tmp_path / "out")
     assert sorted(path.name for path in folder.iterdir()) == sorted([*FILES, ACCOUNT])
-    with pytest.raises(DataError, match=r"map\.txt: there is such a file; give another folder, or overwrite=True"):
+    match.save(str(tmp_path / "out"))
+    (folder / "map.txt").write_text("mine")
+    with pytest.raises(DataError, match=r"map\.txt: there is such a file, .*give another folder, or overwrite=True"):
         match.save(str(tmp_path / "out"))
     assert match.inverse.save(tmp_path / "out", overwrite=True) == folder
     lines = (folder / "map.txt").read_text().splitlines()[1:]
