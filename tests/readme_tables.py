@@ -17,6 +17,7 @@ ROOT = Path(__file__).resolve().parent.parent
 BLOCK = re.compile(r"(<!-- (?:study: (\S+)|headline) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 UNTRAINED = {"acd": "ACD", "asmwd": "ASMWD, the next best of eleven families"}
 REFINED = "ACD, refined: the default of `csm match` [^1]"
+OWN = "csm's own network, `experiment=faust` [^2]"
 TRAINED = {"faust_paper": "CSMCNN", "faust_acscnn": "ACSCNN, the paper's best at 6,890"}
 
 
@@ -36,6 +37,8 @@ def headline() -> str:
     for name, title in TRAINED.items():
         (row,) = (row for row in table4["rows"] if row["row"] == name)
         lines.append(_line(title, [cell["age"] for cell in row["rows"] if _is_nearest(cell)]))
+    own = json.loads((ROOT / "results/own.json").read_text(encoding="utf-8"))
+    lines.append(_line(OWN, [row["age"] for row in own]))
     return "\n".join(lines) + "\n"
 
 

@@ -20,7 +20,7 @@ from csm.data.base import DataModule, DataSet
 from csm.data.shapes import Shape
 from csm.data.splits import Split, as_split
 from csm.data.store import Store
-from csm.data.variants import remeshed
+from csm.data.variants import VariantSet
 from csm.errors import ConfigError, DataError
 from csm.mesh.correspondence import Direction, PointMap
 from csm.mesh.shape import Mesh
@@ -223,14 +223,10 @@ class HumansSet:
     def load(self, name: str) -> Shape:
         """Return one shape; a refined or remeshed one is computed once and kept in the store."""
         humans = load_humans()
-        original, flip = humans.mesh(name), humans.mirror().indices
-        if self.variant == "original":
-            return Shape(original, PointMap.identity(original.n_vertices, name=name), humans.mirror())
-        made = remeshed(original, self.variant, self.n_vertices, self.seed, Store(self.store_root))
-        mesh = Mesh(made["vertices"], made["faces"], name)
-        truth = PointMap(made["truth"], Direction.TEMPLATE_TO_SHAPE, mesh.n_vertices, name)
-        mirror = PointMap(made["truth"][flip], Direction.TEMPLATE_TO_SHAPE, mesh.n_vertices, f"{name}, mirrored")
-        return Shape(mesh, truth, mirror)
+        if self.variant != "original":
+            return VariantSet(HumansSet(), self.variant, self.n_vertices, self.store_root, self.seed).load(name)
+        mesh = humans.mesh(name)
+        return Shape(mesh, PointMap.identity(mesh.n_vertices, name=name), humans.mirror())
 
 
 def _names(persons: Sequence[int], poses: Sequence[int]) -> tuple[str, ...]:

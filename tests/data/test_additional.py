@@ -1,9 +1,8 @@
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
-from csm.data.additional import VariantSet, additional
+from csm.data.additional import additional
 from csm.data.base import DataModule
 from csm.data.registry import recognise
 from csm.data.splits import Split
@@ -18,18 +17,6 @@ SPLIT = Split("mine", ("toy0", "toy1"), ("toy4", "toy5"))
 @pytest.fixture(scope="module")
 def toys(tmp_path_factory):
     return recognise(write_toys(tmp_path_factory.mktemp("also") / "toys"))
-
-
-def test_another_triangulation_keeps_the_places_of_the_template(toys, tmp_path):
-    shapes = VariantSet(toys, "remeshed", 300, str(tmp_path))
-    before, after = toys.load("toy0"), shapes.load("toy0")
-    assert shapes.name == f"{toys.name}_remeshed_300"
-    assert after.mesh.n_vertices != before.mesh.n_vertices
-    assert after.truth.n_from == before.truth.n_from
-    moved = np.linalg.norm(
-        after.mesh.vertices[after.truth.indices] - before.mesh.vertices[before.truth.indices], axis=1
-    )
-    assert moved.max() < 0.2 * np.ptp(before.mesh.vertices, axis=0).max()
 
 
 def test_the_same_shapes_share_a_template_and_humans_have_their_own(toys, tmp_path):

@@ -112,7 +112,7 @@ def test_the_release_is_preferred_to_the_registrations(tmp_path):
 def test_a_folder_without_the_set_names_what_was_wanted(tmp_path):
     with pytest.raises(DataError, match="wanted FAUST_6890 or FAUST_MPI"):
         FaustDataModule(tmp_path, **CHEAP)
-    with pytest.raises(DataError, match=r"wanted faust_80_20, or the path of a json file"):
+    with pytest.raises(DataError, match=r"wanted faust_80_20 or faust_held_out, or the path of a json file"):
         FaustDataModule(layouts.mpi_faust(tmp_path), test=(6890,), split="faust_90_10", **CHEAP)
 
 
