@@ -111,7 +111,7 @@ def test_a_descriptor_of_the_group_is_the_preset_of_that_name(name):
 def test_a_model_of_the_group_is_a_network_that_runs(name):
     options = plain(compose("train", [f"model={name}"]).model)
     network = build(**options, in_channels=5, n_classes=9).double()
-    surface = surface_of(blob(3), 128, stencils_of(**options))
+    surface = surface_of(blob(3), 256, stencils_of(**options))
     assert network(torch.randn(642, 5).double(), surface).shape == (642, 9)
 
 

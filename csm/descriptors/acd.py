@@ -115,6 +115,15 @@ class ACD(ByAngle):
         """Return the settings of the authors' code; with ``frame="released", sweeps=10`` also its frame."""
         return replace(cls.paper(), alpha=4.0, angles=8, k=70, order=5, normalise=True, frame=frame, sweeps=sweeps)
 
+    @classmethod
+    def two_bands(cls) -> Stack:
+        """Return csm's own settings beside those of the authors' code with smooth frames: 688 columns for a network.
+
+        The first sums the 8 to 11 lowest eigenpairs and tells limbs apart, the second sums 70 and tells neighbouring
+        vertices apart.
+        """
+        return Stack({"low": cls(), "high": cls.release(frame="smooth")})
+
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of the columns, J (D + 1) per cut: angle by angle, cut by cut."""
@@ -137,15 +146,6 @@ class ACD(ByAngle):
         if self.centred:
             values -= operators.mass @ values / operators.mass.sum()
         return Features(unit_rows(values) if self.normalise else values, self.columns)
-
-
-def two_bands() -> Stack:
-    """Return csm's own ACD beside that of the authors' code with smooth frames: the input of csm's own network.
-
-    The first sums the 8 to 11 lowest eigenpairs and tells limbs apart, the second sums 70 and tells neighbouring
-    vertices apart: 688 columns.
-    """
-    return Stack({"low": ACD(), "high": ACD.release(frame="smooth")})
 
 
 def chebyshev_block(spectrum: Spectrum, order: int) -> FloatArray:

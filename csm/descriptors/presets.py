@@ -22,7 +22,7 @@ SETTINGS: dict[str, tuple[str, dict[str, Any]]] = {
     "acd_release": ("acd:ACD.release", {}),
     "acd_release_frame": ("acd:ACD.release", {"frame": "released", "sweeps": 10}),
     "acd_isotropic": ("acd:ACD.isotropic", {}),
-    "acd_two_bands": ("acd:two_bands", {}),
+    "acd_two_bands": ("acd:ACD.two_bands", {}),
     "hks": ("hks:HKS", {}),
     "hks_diffusionnet": ("hks:HKS", {"k": 128, "n_times": 16, "scaled": False, "first": 0.01, "last": 1.0}),
     "wks": ("wks:WKS", {}),

@@ -50,10 +50,10 @@ def test_the_figures_compare_what_their_captions_say():
 
 def test_an_experiment_does_not_change_the_network_of_a_recipe_in_silence():
     with initialize_config_dir(str(config_folder()), version_base="1.3"):
-        rows = '{fine: ["recipe=mlp", "experiment=humans_rival"], bad: ["recipe=mlp", "experiment=humans"]}'
+        rows = '{fine: ["recipe=mlp", "experiment=humans_rival"], bad: ["recipe=mlp", "experiment=humans_paper"]}'
         cfg = compose("matrix", [f"+rows={rows}"])
         assert rows_of(OmegaConf.merge(cfg, {"only": ["fine"]}))[0].identity["model.name"] == "mlp"
-        with pytest.raises(ConfigError, match="recipe=mlp trains mlp, but experiment=humans chooses csmcnn"):
+        with pytest.raises(ConfigError, match="recipe=mlp trains mlp, but experiment=humans_paper chooses csmcnn"):
             rows_of(OmegaConf.merge(cfg, {"only": ["bad"]}))
 
 

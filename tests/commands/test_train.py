@@ -15,7 +15,7 @@ TOYS = [*SMALL, "data.root=toys"]
         ([*TOYS, "matching=[nope]"], "matching='nope'"),
         ([*TOYS, "device=meta"], "device=meta"),
         ([*TOYS, "metric.distance=nope"], "metric.distance=nope"),
-        (["recipe=acscnn", "experiment=humans"], "experiment=humans chooses csmcnn"),
+        (["recipe=acscnn", "experiment=humans_paper"], "experiment=humans_paper chooses csmcnn"),
     ],
 )
 def test_an_error_comes_before_the_training(tmp_path, monkeypatch, capsys, arguments, message):

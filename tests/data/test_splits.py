@@ -10,6 +10,7 @@ from csm.errors import DataError
 
 CHECKSUMS = {
     "faust_80_20": "8f0cebb95e75",
+    "faust_held_out": "0f2adee1ea45",
     "humans_80_20": "fc95d86ef489",
     "humans_demo": "c94125a1c470",
     "scape_51_20": "59b854fde6c0",

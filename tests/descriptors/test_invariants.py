@@ -12,7 +12,7 @@ from tests.descriptors.invariances import CHECKS, mirrored, rigid_motion
 from tests.shapes import blob
 
 ACDS = ["acd", "acd_paper", "acd_release", "acd_release_frame"]
-LEFT_RIGHT = [*ACDS, "add", "asmwd", "awft", "shot", "xyz"]
+LEFT_RIGHT = [*ACDS, "acd_two_bands", "add", "asmwd", "awft", "shot", "xyz"]
 
 
 def small(name: str) -> Descriptor:
