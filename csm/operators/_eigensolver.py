@@ -39,7 +39,6 @@ class Attempt(NamedTuple):
     method: str
     block: int
     within: bool = False
-    polish: bool = False
 
 
 class Pairs(NamedTuple):
@@ -61,9 +60,9 @@ def attempts(problem: Problem) -> tuple[Attempt, ...]:
     block = min(max(k // 10, 2), 8)
     return (
         Attempt("shift-invert", 1, within=k > 3),
-        Attempt("shift-invert with blocks", block, polish=True),
-        Attempt("shift-invert with larger blocks", block + 8, polish=True),
-        Attempt("shift-invert with the largest blocks", block + 32, polish=True),
+        Attempt("shift-invert with blocks", block),
+        Attempt("shift-invert with larger blocks", block + 8),
+        Attempt("shift-invert with the largest blocks", block + 32),
     )
 
 
@@ -85,7 +84,7 @@ def _solve(problem: Problem, attempt: Attempt) -> Pairs:
     shift, below = _factored(problem, attempt)
     solve = problem.factors.solve
     inverted = _lanczos(solve, matrix.shape[0], k, below, attempt.block)
-    if attempt.polish:
+    if attempt.block > 1:
         inverted = _polished(solve, inverted.evecs)
     evals = shift + 1 / inverted.evals
     order = np.argsort(evals)
