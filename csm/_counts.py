@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-_IRREGULAR = {"vertex": "vertices", "mesh": "meshes", "copy": "copies", "entry": "entries"}
+_IRREGULAR = {"vertex": "vertices", "mesh": "meshes", "copy": "copies", "entry": "entries", "body": "bodies"}
 
 
 def counted(n: int, one: str, many: str = "") -> str:

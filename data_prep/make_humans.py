@@ -14,16 +14,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
-from humans.bodies import LOCAL_SHAPES, PHENOTYPES, POSES, SUBJECTS, Rig, pose_matrices
+from humans.bodies import POSES, SUBJECTS
 from humans.close_cavities import close_cavities
 from humans.decimate import Decimation
 from humans.edge_flips import flip_towards_delaunay
-from humans.intersect import intersecting_pairs, untangle
+from humans.intersect import untangle
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 from tqdm import tqdm
+
+from csm.data.bodies.making import standing
+from csm.data.bodies.rig import LOCAL_SHAPES, PHENOTYPES, Rig, pose_matrices
+from csm.data.packed import pack
+from csm.mesh.intersections import intersecting_pairs
 
 if TYPE_CHECKING:
     import anny
@@ -50,9 +55,10 @@ def main() -> None:
     template, faces, part, mirror = body_surface(model)
     shapes = people(model, args.seed)[:, part]
     faces = close_cavities(template, faces, cavity_faces(model, part), mirror)
-    shapes, faces, mirror = simplify(shapes, faces, mirror, args.vertices)
-    shapes = np.stack([stand(repair(v, faces, k)) for k, v in enumerate(tqdm(shapes, desc="untangle"))])
+    shapes, faces, mirror, kept = simplify(shapes, faces, mirror, args.vertices)
+    shapes = np.stack([standing(repair(v, faces, k)) for k, v in enumerate(tqdm(shapes, desc="untangle"))])
     write(args.out, shapes, faces, mirror, args.seed)
+    np.savez_compressed(args.out.with_name("humans_anny.npz"), kept=part[kept].astype(np.uint16))
 
 
 def body_surface(model: anny.Anny) -> tuple[Floats, Ints, Ints, Ints]:
@@ -101,8 +107,11 @@ def people(model: anny.Anny, seed: int) -> Floats:
     return np.concatenate(result)
 
 
-def simplify(shapes: Floats, faces: Ints, mirror: Ints, n_vertices: int) -> tuple[Floats, Ints, Ints]:
-    """Decimate by collapses judged on three poses of each subject, then flip edges judged on all shapes."""
+def simplify(shapes: Floats, faces: Ints, mirror: Ints, n_vertices: int) -> tuple[Floats, Ints, Ints, Ints]:
+    """Decimate by collapses judged on three poses of each subject, then flip edges judged on all shapes.
+
+    Returns also the numbers of the vertices that are kept.
+    """
     sample = [s * len(POSES) + (s + p) % len(POSES) for s in range(len(SUBJECTS)) for p in (0, 3, 7)]
     decimation = Decimation(shapes[sample], faces, mirror)
     decimation.run(n_vertices)
@@ -111,7 +120,7 @@ def simplify(shapes: Floats, faces: Ints, mirror: Ints, n_vertices: int) -> tupl
     number[kept] = np.arange(len(kept))
     faces = number[np.array([decimation.faces[k] for k in sorted(decimation.faces)])]
     shapes, mirror = shapes[:, kept], number[mirror[kept]]
-    return shapes, flip_towards_delaunay(shapes, faces, mirror), mirror
+    return shapes, flip_towards_delaunay(shapes, faces, mirror), mirror, kept
 
 
 def repair(vertices: Floats, faces: Ints, number: int) -> Floats:
@@ -129,21 +138,9 @@ def repair(vertices: Floats, faces: Ints, number: int) -> Floats:
     return x
 
 
-def stand(vertices: Floats) -> Floats:
-    """Put the lowest point on the ground and the middle of the bounding box on the vertical axis."""
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    return vertices - [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]
-
-
 def write(path: Path, shapes: Floats, faces: Ints, mirror: Ints, seed: int) -> None:
     """Write 16-bit coordinates (one scale and offset per shape), differences along the vertices, and all metadata."""
-    low, high = shapes.min(axis=1), shapes.max(axis=1)
-    step = (high - low).max(axis=1) / 65535
-    levels = np.round((shapes - low[:, None]) / step[:, None, None]).astype(np.uint16)
-    arrays = {
-        "differences": np.diff(levels, axis=1, prepend=np.uint16(0)),
-        "offset": low,
-        "step": step,
+    arrays = pack(shapes) | {
         "faces": faces.astype(np.uint16),
         "mirror": mirror.astype(np.uint16),
         "subjects": SUBJECTS,

@@ -28,7 +28,7 @@ def run_collection(cfg: DictConfig, method: Method, text: str) -> dict[str, Any]
             f"folder={cfg.folder} together with {given}: wanted either two meshes (csm match SOURCE TARGET) or a "
             "folder of them (csm match folder=DIR out=OUT)"
         )
-    if (cfg.matching, cfg.refine) != ("nearest", "multistart"):
+    if cfg.matching != "nearest" or cfg.refine not in ("auto", "multistart"):
         raise ConfigError(
             f"folder={cfg.folder} with matching={cfg.matching} refine={cfg.refine}: a folder is matched by nearest and "
             "multistart only; leave these options out"

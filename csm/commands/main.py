@@ -21,6 +21,7 @@ COMMANDS = {
     "match": "match two meshes of your own",
     "describe": "compute a descriptor of one mesh",
     "clean": "mend a mesh: weld, split, drop debris, orient; with the map from its old vertices to the new ones",
+    "bodies": "make human bodies by the thousand to train on, on this machine, from the body model anny",
     "prepare": "fill, check or prune the store of bases and descriptors",
     "check": "list what is wrong with meshes: files, or a folder",
     "reproduce": "make tables and figures of the paper again from data",

@@ -18,6 +18,7 @@ WORDS: dict[str, tuple[str, ...]] = {
     "match": ("source", "target", "out"),
     "describe": ("mesh", "out"),
     "clean": ("in", "out"),
+    "bodies": ("out",),
     "check": ("paths",),
     "evaluate": ("checkpoint",),
     "reproduce": ("targets",),

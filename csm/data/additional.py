@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import get_args
 
 from csm._places import load
 from csm.data.shapes import ShapeSet
 from csm.data.store import Store
 from csm.data.variants import Variant, VariantSet
 from csm.errors import ConfigError
+
+_HUMANS = "humans"  # the template of the built-in humans and of bodies
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +43,8 @@ def additional(text: str, train_set: ShapeSet, names: Sequence[str], store: Stor
     ----------
     text
         "remeshed_N" or "refined_N": the training shapes with N vertices and other triangles, or finer; "humans",
-        "humans_remeshed_N", "humans_refined_N": the training persons of the built-in humans.
+        "humans_remeshed_N", "humans_refined_N": the training persons of the built-in humans; the path of a file that
+        ``csm bodies`` has written, "FILE.npz", also with other triangles, "FILE.npz:remeshed_N".
     train_set, names
         The training set, and its shapes that are fitted.
     store
@@ -53,16 +55,33 @@ def additional(text: str, train_set: ShapeSet, names: Sequence[str], store: Stor
     ConfigError
         If the name has another form.
     """
-    built_in, rest = text.startswith("humans"), text.removeprefix("humans").removeprefix("_")
-    variant, _, count = rest.partition("_")
-    root = str(store.root)
-    if built_in and (not rest or (variant in get_args(Variant) and count.isdigit())):
-        shapes: ShapeSet = load("csm.data.humans:HumansSet").parse(rest or "original", root)
-        return Additional(shapes, load("csm.data.humans:SPLITS")[0].train, "humans")
-    if variant in get_args(Variant) and count.isdigit():
-        form: Variant = "refined" if variant == "refined" else "remeshed"
-        return Additional(VariantSet(train_set, form, int(count), root), tuple(names))
+    template = "" if getattr(train_set, "built_in", False) else _HUMANS
+    file, _, other = text.partition(":")
+    if file.endswith(".npz") and (not other or _variant(other)):
+        bodies: ShapeSet = load("csm.data.bodies.archive:Bodies")(file)
+        return Additional(_with_triangles(bodies, other, store), bodies.names, template)
+    if text == "humans" or (text.startswith("humans_") and _variant(text.removeprefix("humans_"))):
+        humans = load("csm.data.humans:HumansSet")()
+        shapes = _with_triangles(humans, text.removeprefix("humans").removeprefix("_"), store)
+        return Additional(shapes, load("csm.data.humans:SPLITS")[0].train, template)
+    if _variant(text):
+        return Additional(_with_triangles(train_set, text, store), tuple(names))
     raise ConfigError(
         f"data.also: {text!r} is no set that can be added; wanted remeshed_N or refined_N, with N vertices, humans, "
-        "humans_remeshed_N or humans_refined_N"
+        "humans_remeshed_N or humans_refined_N, or a file of bodies, FILE.npz, FILE.npz:remeshed_N or "
+        "FILE.npz:refined_N"
     )
+
+
+def _variant(text: str) -> tuple[Variant, int] | None:
+    """Return what "remeshed_5000" or "refined_5000" says, None of another text."""
+    form, _, count = text.partition("_")
+    if not count.isdigit() or int(count) == 0:
+        return None
+    return ("refined", int(count)) if form == "refined" else ("remeshed", int(count)) if form == "remeshed" else None
+
+
+def _with_triangles(shapes: ShapeSet, text: str, store: Store) -> ShapeSet:
+    """Return the shapes with the triangles that a text such as "remeshed_5000" names, or their own without a text."""
+    found = _variant(text)
+    return shapes if found is None else VariantSet(shapes, *found, str(store.root))

@@ -15,8 +15,9 @@ from typing import Any, ClassVar, Literal, TypeAlias, get_args, overload
 
 import numpy as np
 
-from csm._types import Arrays, FloatArray, IntArray
+from csm._types import Arrays, IntArray
 from csm.data.base import DataModule, DataSet
+from csm.data.packed import unpack
 from csm.data.shapes import Shape
 from csm.data.splits import Split, as_split
 from csm.data.store import Store
@@ -125,12 +126,7 @@ class Humans(Sequence[Mesh]):
         if isinstance(key, slice):
             return [self[k] for k in range(len(self))[key]]
         index = range(len(self))[key]
-        return Mesh(self._vertices(index), self.faces, self.names[index])
-
-    def _vertices(self, index: int) -> FloatArray:
-        levels = np.cumsum(self.arrays["differences"][index], axis=0, dtype=np.uint16)
-        vertices: FloatArray = self.arrays["offset"][index] + self.arrays["step"][index] * levels
-        return vertices
+        return Mesh(unpack(self.arrays, index), self.faces, self.names[index])
 
 
 @lru_cache(maxsize=1)
@@ -149,9 +145,8 @@ def load_humans() -> Humans:
 def read_asset() -> Arrays:
     """Read csm/assets/humans.npz from the installed package.
 
-    The arrays are `differences` (S, N, 3) uint16: vertex coordinates in steps, as differences along the vertices modulo
-    2**16; `offset` (S, 3) and `step` (S,) in metres; `faces` (M, 3); `mirror` (N,); `subjects` (people, parameters);
-    `phenotypes`, `poses`: names; `seed`.
+    The arrays are those of `csm.data.packed.pack` in metres; `faces` (M, 3); `mirror` (N,); `subjects` (people,
+    parameters); `phenotypes`, `poses`: names; `seed`.
 
     Raises
     ------

@@ -61,6 +61,13 @@ def shape_sample(prepared: Prepared, truth: PointMap, template: str = "") -> Sha
     return ShapeSample(prepared.mesh.name, *network_input(prepared), rows, torch.as_tensor(classes), template)
 
 
+def n_bytes(sample: ShapeSample) -> int:
+    """Return what the tensors of a sample take in memory."""
+    tables = sample.surface.stencils.values()
+    tensors = [sample.features, *sample.surface.basis, *(t for table in tables for t in table.values()), sample.rows]
+    return sum(t.numel() * t.element_size() for t in [*tensors, sample.classes])
+
+
 def _tensors(arrays: Arrays) -> dict[str, Tensor]:
     """Convert to float32 and int64."""
     kinds = {"f": torch.float32, "i": torch.int64}

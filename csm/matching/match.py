@@ -34,7 +34,7 @@ def match(
     target: MeshLike,
     method: Method | Descriptor | str = "acd",
     matcher: Matcher | str = "nearest",
-    refine: Refiner | str | None = "multistart",
+    refine: Refiner | str | None = "auto",
     *,
     clean: Cleaning = "auto",
     store: Store | str | os.PathLike[str] | None = None,
@@ -47,11 +47,11 @@ def match(
     source, target
         Files that `csm.read_mesh` reads, meshes of csm or trimesh, or pairs (vertices, faces) of arrays.
     method
-        A descriptor, the name of a preset (the default is csm's own setting of ACD), or a trained network of
-        `csm.load_model`.
+        A descriptor, the name of a preset (the default is csm's own ACD), or a network of `csm.load_model`.
     matcher, refine
         A matcher or its name, "nearest" or for networks "argmax", and a refiner or its name: "multistart", "joint",
-        "zoomout", "bijective", "icp" (`csm.matching.refinement`), or "none", which ends at the matcher.
+        "zoomout", "bijective", "icp", "none" (`csm.matching.refinement`); "auto": "joint" for a network, "multistart"
+        for a descriptor.
     clean
         "auto" mends copies of the meshes first (`csm.clean`) where they need it; "off" takes them as they are.  The
         result is on the given vertices in either case.
@@ -79,7 +79,8 @@ def match(
     >>> csm.match(humans.mesh("s00_p00"), humans.mesh("s00_p02"))  # doctest: +SKIP
     Match(s00_p00 -> s00_p02 by acd, nearest+multistart)
     """
-    chosen, (rule,) = as_method(method), as_matchers([matcher], [refine])
+    chosen = as_method(method)
+    (rule,) = as_matchers([matcher], [chosen.refine if refine == "auto" else refine])
     store = store if isinstance(store, Store) else Store(store)
     if isinstance(chosen, PrecomputedMethod):
         clean = "off"  # its features are those of the given vertices

@@ -32,6 +32,9 @@ class Method(ABC):
     name: str
     """What tables and figures call the method."""
 
+    refine: str = "multistart"
+    """Name of the refiner that suits its descriptor."""
+
     @property
     @abstractmethod
     def key(self) -> Mapping[str, Any]:

@@ -32,6 +32,10 @@ class NetworkMethod(Method):
         What tables call it; by default what its training was called.
     """
 
+    refine = (
+        "joint"  # its nearest neighbours rarely exchange limbs; a search for another start would do so now and then
+    )
+
     def __init__(self, module: CSMModule, name: str = "") -> None:
         self.module = module
         self.training: Mapping[str, Any] = module.hparams.get("training") or {}

@@ -8,8 +8,8 @@ from collections import Counter
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
-from scipy.spatial.transform import Rotation
 
+from csm.mesh.intersections import intersecting_pairs
 from tests.conftest import ROOT
 from tests.shapes import sphere
 
@@ -150,29 +150,18 @@ def test_a_filling_has_the_least_sum_of_squared_edges(load):
 def test_triangles_that_cut_through_each_other_are_found_and_come_apart(load, ball):
     intersect = load("humans.intersect")
     vertices, faces, _ = ball
-    assert len(intersect.intersecting_pairs(vertices, faces)) == 0
+    assert len(intersecting_pairs(vertices, faces)) == 0
     crossed = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0.2, 0.2, -1], [0.3, 0.2, 1], [0.2, 0.3, 1]])
     two = np.array([[0, 1, 2], [3, 4, 5]])
-    assert intersect.intersecting_pairs(crossed, two).tolist() == [[0, 1]]
+    assert intersecting_pairs(crossed, two).tolist() == [[0, 1]]
     apart = crossed + np.repeat([[0, 0, 0], [0, 0, 2]], 3, axis=0)
-    assert len(intersect.intersecting_pairs(apart, two)) == 0
+    assert len(intersecting_pairs(apart, two)) == 0
     cap = vertices[:, 2] > 0.9
     tangled = vertices + 0.2 * cap[:, None] * np.random.default_rng(0).normal(size=vertices.shape)
-    assert len(intersect.intersecting_pairs(tangled, faces)) > 0
+    assert len(intersecting_pairs(tangled, faces)) > 0
     smooth = intersect.untangle(tangled, faces)
-    assert len(intersect.intersecting_pairs(smooth, faces)) == 0
+    assert len(intersecting_pairs(smooth, faces)) == 0
     np.testing.assert_array_equal(smooth[vertices[:, 2] < 0], vertices[vertices[:, 2] < 0])
-
-
-def test_rotations_are_those_of_scipy(load):
-    bodies = load("humans.bodies")
-    for vector in np.random.default_rng(0).normal(size=(20, 3)):
-        matrix = bodies.rotation(vector)
-        np.testing.assert_allclose(matrix, Rotation.from_rotvec(vector).as_matrix(), atol=1e-12)
-        np.testing.assert_allclose(bodies.rotation_vector(matrix), Rotation.from_matrix(matrix).as_rotvec(), atol=1e-9)
-        a, b = np.array([0.0, 0.6, 0.8]), vector / np.linalg.norm(vector)
-        np.testing.assert_allclose(bodies.between(a, b) @ a, b, atol=1e-12)
-    np.testing.assert_array_equal(bodies.rotation(np.zeros(3)), np.eye(3))
 
 
 def test_the_right_side_of_a_pose_mirrors_the_left_unless_it_is_given(load):
@@ -187,11 +176,12 @@ def test_simplified_shapes_keep_their_positions_and_the_mirror(load, ball):
     script = load("make_humans")
     vertices, faces, mirror = ball
     scale = np.random.default_rng(0).uniform(0.8, 1.2, (len(script.SUBJECTS) * len(script.POSES), 1, 3))
-    shapes, found, symmetric = script.simplify(vertices * scale, faces, mirror, 500)
+    shapes, found, symmetric, numbers = script.simplify(vertices * scale, faces, mirror, 500)
     assert shapes.shape[1] <= 500
     distance, kept = cKDTree(vertices * scale[0]).query(shapes[0])
     assert distance.max() == 0
     np.testing.assert_array_equal(shapes, (vertices * scale)[:, kept])
+    np.testing.assert_array_equal(kept, numbers)
     np.testing.assert_array_equal(kept[symmetric], mirror[kept])
     assert_closed_and_symmetric(found, symmetric)
 
@@ -199,7 +189,7 @@ def test_simplified_shapes_keep_their_positions_and_the_mirror(load, ball):
 def test_a_figure_stands_on_the_ground_and_the_file_holds_it_to_a_65535th(load, ball, tmp_path, capsys):
     script = load("make_humans")
     vertices, faces, mirror = ball
-    shapes = np.stack([script.stand(vertices * scale + [3.0, 2.0, 1.0]) for scale in SHAPES])
+    shapes = np.stack([script.standing(vertices * scale + [3.0, 2.0, 1.0]) for scale in SHAPES])
     np.testing.assert_allclose(shapes[:, :, 2].min(1), 0, atol=1e-12)
     np.testing.assert_allclose(shapes.min(1)[:, :2] + shapes.max(1)[:, :2], 0, atol=1e-12)
     script.write(tmp_path / "humans.npz", shapes, faces, mirror, 7)
