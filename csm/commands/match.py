@@ -22,6 +22,7 @@ from csm.data.store import Store
 from csm.descriptors.presets import PRESETS
 from csm.errors import ConfigError
 from csm.matching import DescriptorMethod, Method, match_meshes
+from csm.matching.shipped import shipped_models
 from csm.mesh.io.owned import require_not_input, require_own
 from csm.viewer.match_folder import ACCOUNT, FILES, made_by, write_match
 
@@ -78,15 +79,23 @@ def _require_place(folder: Path, inputs: list[Path], overwrite: bool) -> None:
 
 def _method(cfg: DictConfig) -> tuple[Method, str]:
     """Return the method, and what to call it."""
-    if cfg.checkpoint is None:
+    given = cfg.checkpoint or cfg.model
+    if cfg.checkpoint and cfg.model:
+        raise ConfigError(f"checkpoint={cfg.checkpoint} together with model={cfg.model}: a match takes one network")
+    if given is None:
         descriptor = instantiate(cfg.descriptor)
         known = next((name for name, setting in PRESETS.items() if setting == descriptor), None)
         return DescriptorMethod(descriptor), f"the descriptor {known or descriptor}"
+    if cfg.model and cfg.model not in shipped_models():
+        raise ConfigError(
+            f"model={cfg.model}: csm brings no such network; wanted {' or '.join(shipped_models())}; "
+            "one of your own is given by checkpoint=FILE"
+        )
     from csm.matching.network import load_model
 
-    network = load_model(cfg.checkpoint)
+    network = load_model(given)
     trained = f" (trained on {network.trained_on})" if network.trained_on else ""
-    return network, f"the learned descriptor of {Path(cfg.checkpoint).name}{trained}"
+    return network, f"the learned descriptor of {Path(given).name}{trained}"
 
 
 main = command("match")(run)

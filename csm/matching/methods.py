@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from csm._counts import counted
+from csm._places import load
 from csm._types import FloatArray
 from csm.data.prepare import Recipe, features_of
 from csm.data.store import Store
@@ -20,6 +21,7 @@ from csm.descriptors.base import Descriptor, record
 from csm.descriptors.presets import preset
 from csm.errors import ConfigError
 from csm.matching.base import Described
+from csm.matching.shipped import shipped_models
 from csm.mesh.shape import Mesh
 
 if TYPE_CHECKING:
@@ -149,12 +151,12 @@ class PrecomputedMethod(Method):
 
 
 def as_method(method: Method | Descriptor | str) -> Method:
-    """Return a method as it is given, of a descriptor, or of a preset by its name.
+    """Return a method as it is given, of a descriptor, or by name: of a preset, or of a network that csm brings.
 
     Raises
     ------
     ConfigError
-        If there is no preset of that name, or the object is something else.
+        If there is neither a preset nor a network of that name, or the object is something else.
 
     Examples
     --------
@@ -165,6 +167,9 @@ def as_method(method: Method | Descriptor | str) -> Method:
         return method
     if isinstance(method, Descriptor):
         return DescriptorMethod(method)
+    if isinstance(method, str) and method in shipped_models():
+        network: Method = load("csm.matching.network:load_model")(method)
+        return network
     if isinstance(method, str):
         return DescriptorMethod(preset(method), method)
     raise ConfigError(

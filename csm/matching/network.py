@@ -18,6 +18,7 @@ from csm.learning.module import CSMModule
 from csm.learning.samples import network_input, recipe_of
 from csm.matching.base import Classifier, Described
 from csm.matching.methods import Method
+from csm.matching.shipped import shipped_file, shipped_models
 from csm.mesh.shape import Mesh
 
 
@@ -32,9 +33,7 @@ class NetworkMethod(Method):
         What tables call it; by default what its training was called.
     """
 
-    refine = (
-        "joint"  # its nearest neighbours rarely exchange limbs; a search for another start would do so now and then
-    )
+    refine = "joint"  # its nearest neighbours rarely exchange limbs; a search for other starts does so now and then
 
     def __init__(self, module: CSMModule, name: str = "") -> None:
         self.module = module
@@ -78,14 +77,14 @@ class NetworkMethod(Method):
 
 
 def load_model(path: str | os.PathLike[str], name: str = "") -> NetworkMethod:
-    """Load a trained network as a method: a checkpoint of ``csm train``, or the json file of an export.
+    """Load a trained network as a method: one that csm brings, a checkpoint of ``csm train``, or an export's json file.
 
     Nothing in the files is executed, and no configuration is needed.
 
     Parameters
     ----------
     path
-        Such as ``outputs/train/DATE/model.ckpt``.
+        "humans", which csm brings (`csm.matching.shipped`), or a file such as ``outputs/train/DATE/model.ckpt``.
     name
         What tables call it; by default what its training was called.
 
@@ -93,5 +92,12 @@ def load_model(path: str | os.PathLike[str], name: str = "") -> NetworkMethod:
     ------
     DataError
         If there is no such file, or it is no network of csm.
+
+    Examples
+    --------
+    >>> load_model("humans")
+    NetworkMethod('humans', csmcnn)
     """
+    if isinstance(path, str) and path in shipped_models():
+        return NetworkMethod(load_module(shipped_file(path)), name or path)
     return NetworkMethod(load_module(path), name)
