@@ -25,6 +25,7 @@ COMMANDS = {
     "prepare": "fill, check or prune the store of bases and descriptors",
     "check": "list what is wrong with meshes: files, or a folder",
     "reproduce": "make tables and figures of the paper again from data",
+    "doctor": "say what csm finds on this machine, and what is missing",
     "bench": "measure what descriptors, networks or whole matchings cost, also beside other libraries",
 }
 

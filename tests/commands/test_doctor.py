@@ -1,0 +1,47 @@
+from __future__ import annotations
+
+import pytest
+
+from csm.commands.doctor import extras, missing_of, store_in_words
+from csm.data.store import Store
+from tests.shapes import blob
+
+
+def test_what_is_found_is_printed_row_by_row(csm, tmp_path):
+    status, out, _ = csm("doctor", f"data={tmp_path}")
+    assert status == 0
+    rows = dict(line.split("  ", 1) for line in out.splitlines() if "  " in line)
+    assert {"machine", "versions", "BLAS", "devices", "store", "networks", "data sets"} <= rows.keys()
+    assert "csm 0." in rows["versions"]
+    assert rows["devices"].strip().startswith("cpu")
+    assert str(tmp_path / ".store") in rows["store"]
+    assert "none found: set CSM_DATA" in rows["data sets"]
+
+
+@pytest.mark.data
+def test_data_sets_are_named_with_their_places(csm, data_set):
+    folder = data_set("SCAPE_5000")
+    assert f"SCAPE_5000 ({folder})" in csm("doctor", f"data={folder.parent}")[1]
+
+
+def test_extras_are_told_from_requirements_and_from_other_markers():
+    found = missing_of(
+        [
+            "numpy>=1",
+            "numpy>=1; extra == 'there'",
+            'nothing-of-this-name>=2; extra == "gone"',
+            "numpy>=900; extra == 'gone'",
+            "nothing-of-this-name; python_version < '3' and extra == 'old'",
+        ]
+    )
+    assert found == {"there": [], "gone": ["nothing-of-this-name>=2", "numpy>=900"]}
+    words = extras(found)
+    assert words["there"].endswith("installed")
+    assert 'not installed (nothing-of-this-name>=2, numpy>=900): pip install "csm[gone]"' in words["gone"]
+
+
+def test_the_store_is_counted(tmp_path):
+    store = Store(tmp_path / "s")
+    assert store_in_words(store).startswith(f"{tmp_path / 's'}: 0 entries, 0 MiB")
+    store.fetch("lbo", blob(1), {"k": 1}, lambda: {"a": blob(1).vertices})
+    assert ": 1 entry, " in store_in_words(store)
