@@ -1,4 +1,4 @@
-# make install | demo | test | soak | lint | clean; needs make, Python 3.10 to 3.13 with venv, and a package index.
+# make install | demo | test | soak | lint | docs | clean; needs make, Python 3.10 to 3.13 with venv, and a package index.
 PYTHON ?= python3
 WORKERS ?= 2
 
@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test soak lint tables clean
+.PHONY: install demo test soak lint tables docs clean
 
 install: $(STAMP)
 
@@ -34,6 +34,12 @@ SOAK ?= 1
 soak: install
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -m long -n $(WORKERS) tests
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 CSM_SOAK=$(SOAK) $(BIN)/python -m pytest -x tests/soak/soak_*.py
+
+# The site, into build/site: pages of docs/, and those that are made from the code.
+docs: install
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[docs]"
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo "open build/site/index.html"
 
 # The tables of the README, from the json files under results/.
 tables: install

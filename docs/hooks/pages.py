@@ -16,15 +16,26 @@ import csm
 from csm.commands.choices import config_folder, options_of
 from csm.commands.help import read_page
 from csm.commands.main import COMMANDS
+from csm.data.registry import layouts
 
 if TYPE_CHECKING:
     from mkdocs.config.defaults import MkDocsConfig
     from mkdocs.structure.files import Files
 
 ROOT = Path(__file__).parents[2]
-ROOMS = (
-    "mesh operators descriptors data networks learning matching evaluation viewer experiments reproduction".split()
-)
+ROOMS = [
+    "mesh",
+    "operators",
+    "descriptors",
+    "data",
+    "networks",
+    "learning",
+    "matching",
+    "evaluation",
+    "viewer",
+    "experiments",
+    "reproduction",
+]
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
@@ -34,6 +45,18 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     for name, text in made_pages().items():
         files.append(File.generated(config, name, content=text))
     return files
+
+
+def on_page_markdown(markdown: str, **_: object) -> str:
+    """Fill in the table of data sets where a page has its mark, and let links out of the folder stay on the site."""
+    markdown = markdown.replace("](../README.md)", "](index.md)").replace("](../CONTRIBUTING.md)", "](contributing.md)")
+    return re.sub(r"<!-- layouts:.*?-->", lambda _: layouts_table(), markdown)
+
+
+def layouts_table() -> str:
+    """Return every form in which data sets are published, and where."""
+    rows = ((layout.title, re.sub(r"(https?://[^\s,]+)", r"<\1>", layout.origin)) for layout in layouts())
+    return "\n".join(_table(("what csm recognises", "where it is published, and on what terms"), rows))
 
 
 def made_pages() -> dict[str, str]:
@@ -67,7 +90,8 @@ def commands_page() -> str:
         page = read_page(name)
         parts += [f"## csm {name}", "", f"{purpose[0].upper()}{purpose[1:]}.", "", " ".join(page.purpose), ""]
         if page.groups:
-            rows = ((f"`{key}`", f"`{value}`", words) for key, value, words in page.groups)
+            shown = (group for group in page.groups if not group[0].startswith("hydra/"))
+            rows = ((f"`{key}`", f"`{value}`", words) for key, value, words in shown)
             parts += [*_table(("what can be chosen", "default", "meaning"), rows), ""]
         rows = ((f"`{key}`", f"`{value}`", words) for key, value, words in page.options)
         parts += [*_table(("option", "default", "meaning"), rows), ""]
@@ -76,7 +100,12 @@ def commands_page() -> str:
 
 def choices_page() -> str:
     """Return every group with its options and the first comment of their yaml files."""
-    parts = ["# What can be chosen", "", "Each group is given as `group=option`, also to `csm COMMAND -m group=a,b`.", ""]
+    parts = [
+        "# What can be chosen",
+        "",
+        "Each group is given as `group=option`, also to `csm COMMAND -m group=a,b`.",
+        "",
+    ]
     groups = sorted(path.name for path in config_folder().iterdir() if path.is_dir() and path.name != "hydra")
     for group in sorted({*groups, "data", "descriptor", "model"}):
         rows = ((f"`{option}`", _purpose(group, option)) for option in options_of(group))
@@ -102,14 +131,14 @@ def _purpose(group: str, option: str) -> str:
 
 
 def python_page() -> str:
-    """Return the names in `csm` itself."""
-    names = sorted(name for name in dir(csm) if not name.startswith("_"))
-    parts = ["# The names in csm", ""]
-    for name in names:
-        thing = getattr(csm, name)
-        if callable(thing):
-            parts += [f"::: {thing.__module__}.{thing.__qualname__}", "    options:", "      heading_level: 2", ""]
-    return "\n".join(parts)
+    """Return the names in `csm` itself, each with the first line of its documentation and a link to the rest."""
+    things = {name: getattr(csm, name) for name in sorted(dir(csm)) if not name.startswith("_")}
+    rows = (
+        (f"[`csm.{name}`][{thing.__module__}.{thing.__qualname__}]", _first_line(thing.__doc__))
+        for name, thing in things.items()
+        if callable(thing)
+    )
+    return "\n".join(["# The names in csm", "", *_table(("name", "what it is"), rows), ""])
 
 
 def room_page(room: str) -> str:
