@@ -68,6 +68,7 @@ def made_pages() -> dict[str, str]:
         "reference/commands.md": commands_page(),
         "reference/choices.md": choices_page(),
         "reference/python.md": python_page(),
+        "reference/interop.md": "# csm.interop\n\n::: csm.interop\n    options:\n      heading_level: 2\n",
         **{f"reference/{room}.md": room_page(room) for room in ROOMS},
     }
 
