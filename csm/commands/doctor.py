@@ -34,6 +34,8 @@ _IN_WORDS = {
     "prep": "bodies to train on (csm bodies)",
     "browser": "tests of pages in a browser",
     "peers": "comparison with pyFM and geomfum (csm bench matching)",
+    "docs": "the site (make docs)",
+    "notebooks": "notebooks (docs/notebooks)",
     "dev": "work on csm itself",
 }
 

@@ -180,6 +180,11 @@ class Match:
         """Open a page in the browser to turn both meshes around, and return the temporary file that it is in."""
         return Path(load("csm.viewer.match_folder:show_match")(self))
 
+    def _repr_html_(self) -> str | None:
+        """Show both meshes in a notebook."""
+        frame: str | None = load("csm.viewer.notebook:match_frame")(self)
+        return frame
+
     def __repr__(self) -> str:
         names = f"{self.vertex_map.source} -> {self.vertex_map.target}"
         return f"Match({names} by {self.method.name}, {self.matcher.name})"

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from csm._counts import counted
+from csm._places import load
 from csm._types import FloatArray, IntArray
 from csm.errors import MeshError
 
@@ -128,6 +129,11 @@ class Mesh:
             raise MeshError(f"{self.label}: the surface area is {area}, so it cannot be scaled to 1; run `csm check`")
         length = float(np.sqrt(area))
         return replace(self, vertices=self.vertices / length, scale=self.scale * length)
+
+    def _repr_html_(self) -> str | None:
+        """Show the mesh in a notebook."""
+        frame: str | None = load("csm.viewer.notebook:mesh_frame")(self)
+        return frame
 
     def __repr__(self) -> str:
         return f"Mesh({self.name!r}, {counted(self.n_vertices, 'vertex')}, {counted(self.n_faces, 'face')})"
