@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
@@ -73,3 +74,11 @@ def test_a_command_is_also_a_module_and_an_error_is_one_paragraph_with_status_2(
     assert ended.returncode == 2
     assert "nothing.off" in ended.stderr
     assert "Traceback" not in ended.stderr
+
+
+def test_a_backend_of_pictures_that_is_not_installed_disturbs_no_command(tmp_path):
+    """As in a notebook, whose kernel may live in another environment."""
+    words = [sys.executable, "-m", "csm.commands.train", "--cfg", "job"]
+    environment = {**os.environ, "MPLBACKEND": "module://no_such.backend"}
+    ended = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, env=environment, check=False)
+    assert ended.returncode == 0, ended.stderr

@@ -6,6 +6,7 @@ Help is given before the module of a command is imported, which takes seconds.
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 from pathlib import Path
 from typing import NoReturn
@@ -79,6 +80,7 @@ def run_command(name: str) -> None:
 
         print(help_text(name))
         return
+    os.environ["MPLBACKEND"] = "agg"  # pictures go to files; a notebook names a backend that need not be installed here
     try:
         with terminable():
             importlib.import_module(f"csm.commands.{name}").main()
