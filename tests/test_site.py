@@ -27,7 +27,7 @@ def pages() -> ModuleType:
 
 def test_every_command_and_every_choice_is_there(pages):
     commands, choices = pages.commands_page(), pages.choices_page()
-    assert re.findall(r"^## csm (\w+)$", commands, re.MULTILINE) == list(COMMANDS)
+    assert re.findall(r"^## csm ([\w-]+)$", commands, re.MULTILINE) == list(COMMANDS)
     assert "| `checkpoint` | `null` |" in commands
     for group in ("descriptor", "model", "data", "experiment", "recipe"):
         section = choices.partition(f"## {group}\n")[2].partition("\n## ")[0]

@@ -26,6 +26,7 @@ COMMANDS = {
     "prepare": "fill, check or prune the store of bases and descriptors",
     "check": "list what is wrong with meshes: files, or a folder",
     "reproduce": "make tables and figures of the paper again from data",
+    "sweep-report": "make one page of a sweep: its jobs, what each parameter does, the best settings",
     "doctor": "say what csm finds on this machine, and what is missing",
     "bench": "measure what descriptors, networks or whole matchings cost, also beside other libraries",
 }
@@ -33,7 +34,7 @@ COMMANDS = {
 
 def usage() -> str:
     """Return the text of ``csm --help``."""
-    rows = "\n".join(f"  {name:<10}{text}" for name, text in COMMANDS.items())
+    rows = "\n".join(f"  {name:<14}{text}" for name, text in COMMANDS.items())
     return (
         f"csm {__version__}: dense correspondence between deformable meshes with spectral descriptors\n\n"
         f"usage: csm COMMAND [key=value ...]\n\n{rows}\n\n"
@@ -69,7 +70,7 @@ def run_as_program(module: str) -> NoReturn:
     module
         Name of the file of the command's module.
     """
-    run_command(Path(module).stem)
+    run_command(Path(module).stem.replace("_", "-"))
     sys.exit()
 
 
@@ -83,7 +84,7 @@ def run_command(name: str) -> None:
     os.environ["MPLBACKEND"] = "agg"  # pictures go to files; a notebook names a backend that need not be installed here
     try:
         with terminable():
-            importlib.import_module(f"csm.commands.{name}").main()
+            importlib.import_module(f"csm.commands.{name.replace('-', '_')}").main()
     except KeyboardInterrupt as stop:  # while modules are loaded; later the command itself says what is kept
         print("csm: stopped before anything was done", file=sys.stderr)
         sys.exit(exit_status(stop))

@@ -19,6 +19,7 @@ WORDS: dict[str, tuple[str, ...]] = {
     "describe": ("mesh", "out"),
     "clean": ("in", "out"),
     "bodies": ("out",),
+    "sweep-report": ("folder", "out"),
     "check": ("paths",),
     "evaluate": ("checkpoint",),
     "reproduce": ("targets",),

@@ -154,6 +154,30 @@ def sweeps_figure(sweeps: Sequence[Sweep], quantity: str) -> Figure:
     return figure
 
 
+def losses_figure(curves: Mapping[str, Sequence[float]]) -> Figure:
+    """Plot losses over epochs, best first: the first curve is dark and named, the others are light.
+
+    Raises
+    ------
+    ConfigError
+        If there is no curve.
+    """
+    if not curves:
+        raise ConfigError("losses figure: wanted at least one curve")
+    figure = Figure(figsize=(5.4, 3.2), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots()
+    for k, (name, losses) in reversed(list(enumerate(curves.items()))):
+        color, width, label = ("0.1", 1.8, name) if k == 0 else ("0.75", 0.9, None)
+        axes.plot(np.arange(1, len(losses) + 1), losses, color=color, lw=width, label=label)
+    axes.set_yscale("log")
+    axes.set_xlabel("epoch", fontsize=9)
+    axes.set_ylabel("loss", fontsize=9)
+    axes.legend(frameon=False, fontsize=8)
+    plain_axes(axes)
+    return figure
+
+
 def reliability_figure(curves: Mapping[str, Sequence[tuple[float, float, int]]]) -> Figure:
     """Plot how often matches are right over how confident csm was, with a line per kind of map.
 

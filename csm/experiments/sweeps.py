@@ -1,0 +1,263 @@
+"""One page about a sweep: its jobs best first, what each parameter does, how the losses fell, and the best settings."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import fmean
+
+import numpy as np
+
+from csm._counts import counted
+from csm._types import FloatArray
+from csm.errors import ConfigError, DataError
+from csm.viewer.comparisons import Sweep, losses_figure, sweeps_figure
+from csm.viewer.figures import figure_to_array
+from csm.viewer.html import Code, Figure, Section, Table, Text, report_html, write_html
+
+MEAN_ERROR = "mean test error"
+"""The quantity that jobs are compared by unless another is asked for: the mean of `age/...` over the test sets."""
+
+_RESULT = "result.json"
+_SHOWN = ("status", "seconds", "train/loss", "val/age")
+_SEED = "seed"
+
+
+@dataclass(frozen=True)
+class SweepJob:
+    """One job of a sweep.
+
+    Parameters
+    ----------
+    name
+        Of its folder.
+    settings
+        The options that were given for it.
+    numbers
+        What it returned.
+    status, error
+        "ok" or "failed", and why.
+    losses
+        The training loss of each epoch, empty where there is no log.
+    """
+
+    name: str
+    settings: Mapping[str, str]
+    numbers: Mapping[str, float]
+    status: str = "ok"
+    error: str = ""
+    losses: tuple[float, ...] = ()
+
+    def value(self, quantity: str) -> float | None:
+        """Return a quantity of the job: a number that it returned, or `MEAN_ERROR`; None if it has none."""
+        if quantity == MEAN_ERROR:
+            errors = [value for name, value in self.numbers.items() if name.startswith("age/")]
+            return fmean(errors) if errors else None
+        return self.numbers.get(quantity)
+
+
+def read_sweep(folder: Path) -> list[SweepJob]:
+    """Return the jobs of a sweep, in the order of their numbers.
+
+    Raises
+    ------
+    DataError
+        If there are none.
+    """
+    files = sorted(folder.glob(f"*/{_RESULT}"), key=lambda path: (len(path.parent.name), path.parent.name))
+    if not files:
+        raise DataError(
+            f"{folder}: there are no jobs with {_RESULT}; wanted the folder of a sweep, such as "
+            "outputs/train_sweep/DATE"
+        )
+    return [_job(path) for path in files]
+
+
+def _job(path: Path) -> SweepJob:
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise DataError(f"{path}: not a result of a job ({error})") from error
+    pairs = [text.lstrip("+~").split("=", 1) for text in record.pop("overrides", ()) if "=" in text]
+    numbers = {key: float(value) for key, value in record.items() if isinstance(value, int | float)}
+    return SweepJob(
+        path.parent.name,
+        {key: value.strip("'") for key, value in pairs},
+        numbers,
+        str(record.get("status", "ok")),
+        str(record.get("error", "")),
+        tuple(_losses(path.parent)),
+    )
+
+
+def _losses(folder: Path) -> list[float]:
+    """Return the mean training loss of each epoch from the log of TensorBoard, if there is one."""
+    places = {path.parent for path in folder.rglob("events.out.tfevents.*")}
+    if not places:
+        return []
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    log = EventAccumulator(str(min(places)), size_guidance={"scalars": 0, "images": 1, "tensors": 1}).Reload()
+    if not {"train/loss", "epoch"} <= set(log.Tags()["scalars"]):
+        return []
+    epochs = {event.step: int(event.value) for event in log.Scalars("epoch")}
+    found: dict[int, list[float]] = {}
+    for event in log.Scalars("train/loss"):
+        if event.step in epochs:
+            found.setdefault(epochs[event.step], []).append(event.value)
+    return [fmean(found[epoch]) for epoch in sorted(found)]
+
+
+def varied(jobs: Sequence[SweepJob]) -> dict[str, list[str]]:
+    """Return the parameters that take more than one value in a sweep, with the values in order."""
+    names = dict.fromkeys(name for job in jobs for name in job.settings)
+    values = {name: sorted({job.settings.get(name, "") for job in jobs}, key=_order) for name in names}
+    return {name: found for name, found in values.items() if len(found) > 1}
+
+
+def _order(text: str) -> tuple[int, float, str]:
+    try:
+        return 0, float(text), text
+    except ValueError:
+        return 1, 0.0, text
+
+
+def importance(jobs: Sequence[SweepJob], quantity: str) -> dict[str, float]:
+    """Return the share of a quantity's variance that the means over each parameter's values account for, largest first.
+
+    Between 0 and 1.  Parameters of a full grid share the whole among themselves and their interactions.
+    """
+    known = [(job, value) for job in jobs if (value := job.value(quantity)) is not None]
+    total = float(np.var([value for _, value in known])) if known else 0.0
+    shares = {}
+    for name in varied([job for job, _ in known]):
+        groups = _groups(known, name)
+        mean = fmean(value for _, value in known)
+        between = sum(len(group) * (fmean(group) - mean) ** 2 for group in groups.values()) / len(known)
+        shares[name] = between / total if total > 0 else 0.0
+    return dict(sorted(shares.items(), key=lambda item: -item[1]))
+
+
+def _groups(known: Sequence[tuple[SweepJob, float]], name: str) -> dict[str, list[float]]:
+    groups: dict[str, list[float]] = {}
+    for job, value in sorted(known, key=lambda pair: _order(pair[0].settings.get(name, ""))):
+        groups.setdefault(job.settings.get(name, ""), []).append(value)
+    return groups
+
+
+def write_sweep_report(folder: Path, out: Path, by: str | None = None) -> SweepJob:
+    """Write the page of a sweep, and return the job with the smallest value.
+
+    Parameters
+    ----------
+    folder
+        Of the sweep: each job has a folder in it.
+    out
+        The page, ``.html``.
+    by
+        The number that jobs are compared by; the smallest is the best.  By default `MEAN_ERROR`, else `val/age`.
+
+    Raises
+    ------
+    DataError
+        If there are no jobs.
+    ConfigError
+        If no job has such a number.
+    """
+    jobs = read_sweep(folder)
+    quantity = by or next(
+        (q for q in (MEAN_ERROR, "val/age", "train/loss") if any(j.value(q) is not None for j in jobs)), ""
+    )
+    ranked = sorted(
+        (job for job in jobs if job.value(quantity) is not None), key=lambda job: float(job.value(quantity) or 0)
+    )
+    if not ranked:
+        known = sorted({name for job in jobs for name in job.numbers})
+        raise ConfigError(
+            f"{folder}: no job has {quantity or MEAN_ERROR!r}; there are {', '.join(known) or 'no numbers'}"
+        )
+    best, rest = ranked[0], [job for job in jobs if job not in ranked]
+    sections = [
+        Section("The best", [Text(_best_in_words(ranked, quantity)), Code(_command(best))]),
+        Section("All jobs, best first", [_table([*ranked, *rest], quantity)]),
+        *_effects(ranked, quantity),
+        *_curves(ranked),
+    ]
+    lead = f"{counted(len(jobs), 'job')} in {folder.name}, compared by {quantity}; the smallest is the best."
+    write_html(out, report_html("A sweep", sections, lead=lead))
+    return best
+
+
+def _best_in_words(ranked: Sequence[SweepJob], quantity: str) -> str:
+    best = ranked[0]
+    text = f"Job {best.name} has {quantity} {best.value(quantity):.4g}."
+    if len(ranked) > 1:
+        middle = ranked[len(ranked) // 2]
+        text += f" The next has {ranked[1].value(quantity):.4g}, the middle one {middle.value(quantity):.4g}."
+    seeds = {job.settings.get(_SEED) for job in ranked}
+    if len(seeds) < 2:
+        text += " With one seed, a small difference may be chance: repeat the best ones with seed=0,1,2."
+    return text
+
+
+def _command(job: SweepJob) -> str:
+    return "csm train " + " ".join(f"{key}={value}" for key, value in job.settings.items())
+
+
+def _table(jobs: Sequence[SweepJob], quantity: str) -> Table:
+    parameters = list(varied(jobs))
+    tests = list(dict.fromkeys(n for job in jobs for n in job.numbers if n.startswith("age/")))
+    columns = ["job", *parameters, quantity, *[n for n in (*tests, *_SHOWN) if n != quantity]]
+    rows = [
+        [
+            job.name,
+            *(job.settings.get(p, "") for p in parameters),
+            *(_cell(job, c) for c in columns[1 + len(parameters) :]),
+        ]
+        for job in jobs
+    ]
+    return Table(columns, rows)
+
+
+def _cell(job: SweepJob, column: str) -> str:
+    if column == "status":
+        return job.status if job.status == "ok" else f"{job.status}: {job.error}"
+    value = job.value(column)
+    return "" if value is None else f"{value:.4g}"
+
+
+def _effects(ranked: Sequence[SweepJob], quantity: str) -> list[Section]:
+    shares = importance(ranked, quantity)
+    if not shares:
+        return []
+    known = [(job, float(job.value(quantity) or 0)) for job in ranked]
+    sweeps = []
+    for name in shares:
+        groups = _groups(known, name)
+        means: FloatArray = np.array([fmean(group) for group in groups.values()])
+        spread: FloatArray = np.array(
+            [float(np.std(group)) / max(1, len(group) - 1) ** 0.5 for group in groups.values()]
+        )
+        sweeps.append(Sweep(name, list(groups), {quantity: (means, spread)}, ranked[0].settings.get(name, "")))
+    rows = [[name, f"{100 * share:.0f} %"] for name, share in shares.items()]
+    return [
+        Section(
+            "What each parameter does",
+            [
+                Table(["parameter", "share of the variance"], rows),
+                Figure(
+                    figure_to_array(sweeps_figure(sweeps, quantity)),
+                    "Means over all other parameters, with standard errors; the ring is the best job.",
+                ),
+            ],
+        )
+    ]
+
+
+def _curves(ranked: Sequence[SweepJob]) -> list[Section]:
+    curves = {job.name: job.losses for job in ranked if job.losses}
+    if not curves:
+        return []
+    return [Section("Training losses", [Figure(figure_to_array(losses_figure(curves)), "The best job is dark.")])]

@@ -1,0 +1,78 @@
+from __future__ import annotations
+
+import json
+from itertools import product
+from pathlib import Path
+
+import pytest
+from torch.utils.tensorboard import SummaryWriter
+
+from csm.errors import ConfigError, DataError
+from csm.experiments.sweeps import MEAN_ERROR, importance, read_sweep, varied, write_sweep_report
+
+
+def write_job(folder: Path, name: str, overrides: list[str], **numbers: object) -> Path:
+    place = folder / name
+    place.mkdir(parents=True)
+    record = {"status": "ok", "seconds": 3.0, "overrides": overrides, **numbers}
+    (place / "result.json").write_text(json.dumps(record))
+    return place
+
+
+@pytest.fixture
+def sweep(tmp_path):
+    """Twelve jobs whose error is that of ks, plus a little of the rate; the seed does nothing."""
+    for k, (ks, rate, seed) in enumerate(product((32, 64, 128), ("0.001", "0.003"), (0, 1))):
+        error = 1 / ks + (0.001 if rate == "0.001" else 0.0)
+        overrides = ["experiment=humans", f"model.ks={ks}", f"optimizer.lr={rate}", f"seed={seed}"]
+        place = write_job(tmp_path, str(k), overrides, **{"age/a": error, "age/b": 3 * error, "train/loss": 9.0 - k})
+        with SummaryWriter(place / "tensorboard") as log:
+            for step in range(6):
+                log.add_scalar("epoch", step // 2, step)
+                log.add_scalar("train/loss", 6.0 - step - 0.1 * k, step)
+    write_job(tmp_path, "12", ["experiment=humans", "model.ks=256"], status="failed", error="no memory")
+    return tmp_path
+
+
+def test_jobs_are_read_in_order_with_their_losses(sweep):
+    jobs = read_sweep(sweep)
+    assert [job.name for job in jobs] == [str(k) for k in range(13)]
+    assert jobs[0].losses == pytest.approx((5.5, 3.5, 1.5))
+    assert jobs[3].value(MEAN_ERROR) == pytest.approx(2 / 32)
+    assert (jobs[12].status, jobs[12].value(MEAN_ERROR)) == ("failed", None)
+    assert varied(jobs)["model.ks"] == ["32", "64", "128", "256"]
+    assert "experiment" not in varied(jobs)
+
+
+def test_the_variance_belongs_to_the_parameters_that_make_it(sweep):
+    shares = importance(read_sweep(sweep)[:12], MEAN_ERROR)
+    assert list(shares) == ["model.ks", "optimizer.lr", "seed"]
+    assert shares["model.ks"] > 0.95
+    assert shares["seed"] == pytest.approx(0, abs=1e-12)
+    assert sum(shares.values()) == pytest.approx(1)
+
+
+def test_the_page_names_the_best_and_holds_every_job(sweep):
+    best = write_sweep_report(sweep, sweep / "sweep.html")
+    assert best.settings["model.ks"] == "128"
+    assert best.settings["optimizer.lr"] == "0.003"
+    page = (sweep / "sweep.html").read_text()
+    assert "csm train experiment=humans model.ks=128 optimizer.lr=0.003" in page
+    assert "failed: no memory" in page
+    for heading in ("The best", "All jobs, best first", "What each parameter does", "Training losses"):
+        assert f"<h2>{heading}</h2>" in page
+
+
+def test_jobs_are_compared_by_what_is_asked_for(sweep):
+    assert write_sweep_report(sweep, sweep / "x.html", "train/loss").name == "11"
+    with pytest.raises(ConfigError, match=r"no job has 'age/c'; there are age/a, age/b"):
+        write_sweep_report(sweep, sweep / "x.html", "age/c")
+
+
+def test_what_is_no_sweep_is_named(tmp_path):
+    with pytest.raises(DataError, match=r"there are no jobs with result\.json; wanted the folder of a sweep"):
+        read_sweep(tmp_path)
+    write_job(tmp_path, "0", [])
+    (tmp_path / "0" / "result.json").write_text("{")
+    with pytest.raises(DataError, match=r"0/result\.json: not a result of a job"):
+        read_sweep(tmp_path)
