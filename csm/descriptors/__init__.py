@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from csm.descriptors.constant import Constant
     from csm.descriptors.coordinates import Coordinates
     from csm.descriptors.dep import DEP
+    from csm.descriptors.geometry_vectors import GeometryVectors
     from csm.descriptors.gps import GPS
     from csm.descriptors.hks import HKS
     from csm.descriptors.presets import FAMILIES, PRESETS, from_parameters, preset
@@ -55,6 +56,7 @@ __all__ = [
     "Coordinates",
     "Descriptor",
     "Features",
+    "GeometryVectors",
     "Stack",
     "from_parameters",
     "preset",

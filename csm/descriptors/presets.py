@@ -37,6 +37,7 @@ SETTINGS: dict[str, tuple[str, dict[str, Any]]] = {
     "awft": ("awft:AWFT", {}),
     "asmwd": ("asmwd:ASMWD", {}),
     "add": ("add:ADD", {}),
+    "geometry_vectors": ("geometry_vectors:GeometryVectors", {}),
     "gps": ("gps:GPS", {}),
     "constant": ("constant:Constant", {}),
     "xyz": ("coordinates:Coordinates", {}),

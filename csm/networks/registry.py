@@ -69,6 +69,10 @@ MODELS: dict[str, dict[str, Any]] = {
     "mgcn": {"name": "mgcn"},
     # The input descriptor through a perceptron, vertex by vertex: csmcnn_paper without its convolutions (Figure 11).
     "mlp": {"name": "mlp"},
+    # The network on top of OSD (Litman and Bronstein 2014), whose input is descriptor=geometry_vectors. Its authors fit
+    # linear filters to pairs of points in closed form; here a perceptron is trained with the loss of all other methods.
+    # It is that of add_mlp, so that the two differ in the anisotropy of their input alone.
+    "osd": {"name": "mlp", "widths": [256, 256, 256, 256]},
     # SplineCNN (Fey et al. 2018) as in the authors' example for FAUST, whose input is descriptor=constant and which
     # sums over the neighbours (the text of the paper takes the mean). Its published training is Adam at 0.01 for 60
     # epochs and at 0.001 for 40 more.

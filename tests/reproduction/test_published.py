@@ -14,7 +14,15 @@ COUNTS = {
     "diffusionnet": 1_351_786,
 }
 """At 6890 classes, from the publications' code."""
-WIDTHS = {"acd_release": 48, "weds": 128, "constant": 1, "hks_diffusionnet": 16, "acd_paper": 140, "add": 256}
+WIDTHS = {
+    "acd_release": 48,
+    "weds": 128,
+    "constant": 1,
+    "hks_diffusionnet": 16,
+    "acd_paper": 140,
+    "add": 256,
+    "geometry_vectors": 150,
+}
 
 
 def test_every_descriptor_of_the_paper_has_a_preset_and_a_number_for_every_set():
