@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from csm.descriptors.geometry_vectors import GeometryVectors
     from csm.descriptors.gps import GPS
     from csm.descriptors.hks import HKS
+    from csm.descriptors.lps import LPS
     from csm.descriptors.presets import FAMILIES, PRESETS, from_parameters, preset
     from csm.descriptors.shot import SHOT
     from csm.descriptors.smwd import SMWD
@@ -46,6 +47,7 @@ __all__ = [
     "FAMILIES",
     "GPS",
     "HKS",
+    "LPS",
     "PRESETS",
     "SHOT",
     "SMWD",

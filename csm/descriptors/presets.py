@@ -39,6 +39,7 @@ SETTINGS: dict[str, tuple[str, dict[str, Any]]] = {
     "add": ("add:ADD", {}),
     "geometry_vectors": ("geometry_vectors:GeometryVectors", {}),
     "gps": ("gps:GPS", {}),
+    "lps": ("lps:LPS", {}),
     "constant": ("constant:Constant", {}),
     "xyz": ("coordinates:Coordinates", {}),
 }
