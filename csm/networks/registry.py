@@ -19,6 +19,7 @@ PLACES = {
     "chebynet": "chebynet:ChebyNet",
     "csmcnn": "csmcnn:CSMCNN",
     "diffusionnet": "diffusionnet:DiffusionNet",
+    "gcnn": "gcnn:GCNN",
     "identity": "identity:Identity",
     "mgcn": "mgcn:MGCN",
     "mlp": "mlp:MLP",
@@ -57,6 +58,9 @@ MODELS: dict[str, dict[str, Any]] = {
     # blocks directly, so the learned descriptor has 128 channels; descriptor_channels=256 puts a linear layer of that
     # width in between.
     "diffusionnet": {"name": "diffusionnet"},
+    # GCNN (Masci et al. 2015), whose input is descriptor=geometry_vectors. The patches are those of the authors' public
+    # preparation, the layer is that of their later tutorial, and what both leave open is called a guess there.
+    "gcnn": {"name": "gcnn"},
     # No network: the input descriptor itself is matched (with trainer.max_epochs=0), or a linear classifier of it is
     # trained.
     "identity": {"name": "identity"},
