@@ -104,7 +104,8 @@ def correlation(patches: Tensor, weight: Tensor) -> Tensor:
     rays = weight.shape[1]
     d = torch.fft.rfft(patches, dim=2).permute(2, 0, 1, 3).flatten(2)
     w = torch.fft.rfft(weight, dim=1).conj().transpose(0, 1).flatten(1, 2)
-    return torch.fft.irfft(torch.bmm(d, w), n=rays, dim=0).transpose(0, 1)
+    turned: Tensor = torch.fft.irfft(torch.bmm(d, w), n=rays, dim=0)
+    return turned.transpose(0, 1)
 
 
 def _pooled(x: Tensor, weight: Tensor, patches: Patches) -> Tensor:

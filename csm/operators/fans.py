@@ -55,10 +55,8 @@ def fans(mesh: Mesh) -> Fans:
     ends = np.flatnonzero((walk.last >= 0) & ~walk.closes)
     tails = np.concatenate([vertex[walk.corners], ends])
     heads = np.concatenate([following[walk.corners], preceding[walk.last[ends]]])
-    whole = np.where(walk.turned > 0, walk.turned, 1.0)
-    directions = (
-        np.concatenate([walk.directions, walk.turned[ends]]) * np.where(walk.closes, 2 * np.pi / whole, 1.0)[tails]
-    )
+    directions = np.concatenate([walk.directions, walk.turned[ends]])
+    directions *= np.where(walk.closes, 2 * np.pi / np.where(walk.turned > 0, walk.turned, 1.0), 1.0)[tails]
     lengths = np.linalg.norm(mesh.vertices[heads] - mesh.vertices[tails], axis=1)
     order = np.lexsort((lengths, tails))
     reference = np.zeros(n)

@@ -17,6 +17,7 @@ from csm.operators.fans import Fans, fans
 
 _BLOCK = 256  # centres at a time
 _GAIN = 1e-6  # least part of a distance by which a shorter one replaces it
+_MARGIN = 1.2  # times the limit is how far fronts go: a vertex may be seen past one that is farther away
 _DETOUR = 1.5  # paths along edges are at most so much longer than the limit where a vertex is looked at
 
 
@@ -37,10 +38,10 @@ def polar_discs(mesh: Mesh, limit: float) -> PolarDiscs:
     """Return the geodesic polar coordinates around every vertex of all vertices within `limit`, and of its neighbours.
 
     The directions of the edges at a centre are the angles between them, scaled to 2 pi in all where the faces close up.
-    From there coordinates spread over the faces, nearest vertices first, and again from where they get shorter: of a face with two known corners, the plane is
-    unfolded until the known distances meet in one point, which is where the third corner is seen from; its direction
-    lies between the two known ones as its line of sight does.  Where that line leaves the face, the way is along an
-    edge.  On a plane, both are exact.
+    From there coordinates spread over the faces, nearest vertices first, and again from where they get shorter.  Of a
+    face with two known corners, the plane is unfolded until the known distances meet in one point, which is where the
+    third corner is seen from; its direction lies between the two known ones as its line of sight does.  Where that line
+    leaves the face, the way is along an edge.  On a plane, distances and directions are exact.
 
     Angles increase counter-clockwise, seen from outside, from the centre's longest edge.
 
@@ -66,9 +67,9 @@ def polar_discs(mesh: Mesh, limit: float) -> PolarDiscs:
 
 def _block(mesh: Mesh, around: Fans, graph: sparse.csr_array, centres: IntArray, limit: float) -> PolarDiscs:
     front = _Front.around(around, graph, centres, limit)
-    while (nearest := front.close(limit)) is not None:
+    while (nearest := front.close(_MARGIN * limit)) is not None:
         front.spread(mesh, around, *nearest)
-    kept = (front.closed | front.neighbour) & np.isfinite(front.radii)
+    kept = (front.radii <= limit) | front.neighbour
     kept[np.arange(len(centres)), front.slots[np.arange(len(centres)), centres]] = False
     indptr = np.concatenate([[0], np.cumsum(kept.sum(axis=1))])
     return PolarDiscs(indptr, front.vertices[kept], front.radii[kept], np.mod(front.angles[kept], 2 * np.pi))

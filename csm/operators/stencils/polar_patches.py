@@ -99,9 +99,8 @@ class PolarPatches(Stencil):
         row, vertex = row[order], np.concatenate([centres, discs.vertices[entries]])[order]
         rho = np.concatenate([own, discs.radii[entries]])[order]
         theta = np.concatenate([own + np.nan, discs.angles[entries]])[order]
-        logs = (
-            self._log_weights(rho, theta, radius) + np.log(np.maximum(areas, np.finfo(np.float64).tiny))[vertex, None]
-        )
+        logs = self._log_weights(rho, theta, radius)
+        logs += np.log(np.maximum(areas[vertex], np.finfo(np.float64).tiny))[:, None]
         starts = np.searchsorted(row, np.arange(len(centres)))
         weights = np.exp(logs - np.maximum.reduceat(logs, starts)[row])
         weights[weights < _NEGLIGIBLE] = 0.0
@@ -118,7 +117,8 @@ class PolarPatches(Stencil):
         turns = np.nan_to_num(theta[:, None] / (2 * np.pi) - np.arange(self.rays) / self.rays)
         around = np.where(np.isnan(theta)[:, None], 0.0, (turns + 0.5) % 1.0 - 0.5) * self.rays
         squares = across[:, :, None] ** 2 + around[:, None, :] ** 2
-        return -squares.reshape(len(rho), -1) / (2 * self.spread**2)
+        logs: FloatArray = -squares.reshape(len(rho), -1) / (2 * self.spread**2)
+        return logs
 
 
 class _Windows(NamedTuple):
