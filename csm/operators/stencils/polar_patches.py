@@ -52,7 +52,7 @@ class PolarPatches(Stencil):
     hundredth of the greatest of a window are dropped.  Where vertices are far apart, a window has only the one that
     fits it best.
 
-    The first ray points along the longest edge of the vertex.  A built-in human of 6899 vertices takes four seconds,
+    The first ray points along the longest edge of the vertex.  A built-in human of 6899 vertices takes six seconds,
     and has 1.1 million weights (13 MB) with the radius of 0.01 that `csm.networks.GCNN` asks for.
 
     References
