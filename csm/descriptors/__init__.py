@@ -25,8 +25,10 @@ if TYPE_CHECKING:
     from csm.descriptors.constant import Constant
     from csm.descriptors.coordinates import Coordinates
     from csm.descriptors.dep import DEP
+    from csm.descriptors.geometry_vectors import GeometryVectors
     from csm.descriptors.gps import GPS
     from csm.descriptors.hks import HKS
+    from csm.descriptors.lps import LPS
     from csm.descriptors.presets import FAMILIES, PRESETS, from_parameters, preset
     from csm.descriptors.shot import SHOT
     from csm.descriptors.smwd import SMWD
@@ -45,6 +47,7 @@ __all__ = [
     "FAMILIES",
     "GPS",
     "HKS",
+    "LPS",
     "PRESETS",
     "SHOT",
     "SMWD",
@@ -55,6 +58,7 @@ __all__ = [
     "Coordinates",
     "Descriptor",
     "Features",
+    "GeometryVectors",
     "Stack",
     "from_parameters",
     "preset",

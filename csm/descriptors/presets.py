@@ -37,7 +37,9 @@ SETTINGS: dict[str, tuple[str, dict[str, Any]]] = {
     "awft": ("awft:AWFT", {}),
     "asmwd": ("asmwd:ASMWD", {}),
     "add": ("add:ADD", {}),
+    "geometry_vectors": ("geometry_vectors:GeometryVectors", {}),
     "gps": ("gps:GPS", {}),
+    "lps": ("lps:LPS", {}),
     "constant": ("constant:Constant", {}),
     "xyz": ("coordinates:Coordinates", {}),
 }

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from csm.networks.csmcnn import CSMCNN
     from csm.networks.csmconv import CSMConv
     from csm.networks.diffusionnet import DiffusionNet
+    from csm.networks.gcnn import GCNN, GeodesicConv
     from csm.networks.identity import Identity
     from csm.networks.mgcn import MGCN
     from csm.networks.mgconv import MGConv
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = [
     "ACSCNN",
     "CSMCNN",
+    "GCNN",
     "MGCN",
     "MLP",
     "MODELS",
@@ -37,6 +39,7 @@ __all__ = [
     "ConvolutionalNetwork",
     "CorrespondenceNetwork",
     "DiffusionNet",
+    "GeodesicConv",
     "Identity",
     "MGConv",
     "SplineCNN",
@@ -54,6 +57,7 @@ _PLACES = {
     "csm.networks.csmcnn": ("CSMCNN",),
     "csm.networks.csmconv": ("CSMConv",),
     "csm.networks.diffusionnet": ("DiffusionNet",),
+    "csm.networks.gcnn": ("GCNN", "GeodesicConv"),
     "csm.networks.identity": ("Identity",),
     "csm.networks.mgcn": ("MGCN",),
     "csm.networks.mgconv": ("MGConv",),

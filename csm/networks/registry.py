@@ -19,6 +19,7 @@ PLACES = {
     "chebynet": "chebynet:ChebyNet",
     "csmcnn": "csmcnn:CSMCNN",
     "diffusionnet": "diffusionnet:DiffusionNet",
+    "gcnn": "gcnn:GCNN",
     "identity": "identity:Identity",
     "mgcn": "mgcn:MGCN",
     "mlp": "mlp:MLP",
@@ -57,6 +58,9 @@ MODELS: dict[str, dict[str, Any]] = {
     # blocks directly, so the learned descriptor has 128 channels; descriptor_channels=256 puts a linear layer of that
     # width in between.
     "diffusionnet": {"name": "diffusionnet"},
+    # GCNN (Masci et al. 2015), whose input is descriptor=geometry_vectors. The patches are those of the authors' public
+    # preparation, the layer is that of their later tutorial, and what both leave open is called a guess there.
+    "gcnn": {"name": "gcnn"},
     # No network: the input descriptor itself is matched (with trainer.max_epochs=0), or a linear classifier of it is
     # trained.
     "identity": {"name": "identity"},
@@ -69,6 +73,10 @@ MODELS: dict[str, dict[str, Any]] = {
     "mgcn": {"name": "mgcn"},
     # The input descriptor through a perceptron, vertex by vertex: csmcnn_paper without its convolutions (Figure 11).
     "mlp": {"name": "mlp"},
+    # The network on top of OSD (Litman and Bronstein 2014), whose input is descriptor=geometry_vectors. Its authors fit
+    # linear filters to pairs of points in closed form; here a perceptron is trained with the loss of all other methods.
+    # It is that of add_mlp, so that the two differ in the anisotropy of their input alone.
+    "osd": {"name": "mlp", "widths": [256, 256, 256, 256]},
     # SplineCNN (Fey et al. 2018) as in the authors' example for FAUST, whose input is descriptor=constant and which
     # sums over the neighbours (the text of the paper takes the mean). Its published training is Adam at 0.01 for 60
     # epochs and at 0.001 for 40 more.

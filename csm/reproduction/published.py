@@ -103,6 +103,8 @@ NETWORKS: Mapping[str, NetworkSetting] = {
     "chebynet": NetworkSetting("ChebyNet", "chebynet", "constant"),
     "mlp": NetworkSetting("ACD + MLP", "mlp", "acd_paper"),
     "diffusionnet": NetworkSetting("DiffusionNet", "diffusionnet", "hks_diffusionnet"),
+    "osd": NetworkSetting("OSD", "osd", "geometry_vectors"),
+    "gcnn": NetworkSetting("GCNN", "gcnn", "geometry_vectors"),
 }
 """The methods of Tables 4 to 6, and today's reference, by the names of the rows of experiments."""
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 import torch
 
-from csm.networks import CSMCNN, MLP, Basis, Surface
+from csm.networks import CSMCNN, MLP, Basis, Surface, build, settings
 
 NOWHERE = Surface(Basis(torch.zeros(0), torch.zeros(7, 0), torch.ones(7)))
 
@@ -21,6 +21,11 @@ def test_the_default_is_csmcnn_without_its_convolutions():
 def test_count_of_the_network_of_add():
     batch_norm = 4 * 2 * 256
     assert count(MLP(256, 6890, widths=(256, 256, 256, 256))) == 4 * (256 * 256 + 256) + batch_norm + 1_770_730
+
+
+def test_the_network_of_osd_is_that_of_add_on_narrower_rows():
+    osd, add = (build(in_channels=n, n_classes=6890, **settings(name)) for n, name in ((150, "osd"), (256, "add_mlp")))
+    assert count(osd) == count(add) - (256 - 150) * 256 == 2_008_810
 
 
 def test_against_the_layers_one_by_one():

@@ -15,6 +15,7 @@ OPTIONS = {
     "chebynet": ({"laplacian": "cotangent"}, {"scaled_laplacian": {"laplacian": "cotangent"}}),
     "csmcnn": ({"ks": 9}, {}),
     "diffusionnet": ({"regularisation": 1e-4}, {"gradients": {"regularisation": 1e-4}}),
+    "gcnn": ({"radius": 0.02, "rings": 2, "rays": 4}, {"polar_patches": {"radius": 0.02, "rings": 2, "rays": 4}}),
     "identity": ({"dropout": 0.1}, {}),
     "mgcn": ({"ks": 40, "filters": 8}, {"wavelets": {"k": 40, "n_filters": 8}}),
     "mlp": ({"widths": [5]}, {}),

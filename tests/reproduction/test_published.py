@@ -12,9 +12,18 @@ COUNTS = {
     "mgcn": 2_848_234,
     "csmcnn": 1_906_602,
     "diffusionnet": 1_351_786,
+    "gcnn": 2_667_546,
 }
-"""At 6890 classes, from the publications' code."""
-WIDTHS = {"acd_release": 48, "weds": 128, "constant": 1, "hks_diffusionnet": 16, "acd_paper": 140, "add": 256}
+"""At 6890 classes, from the publications' code; for GCNN from the sizes that later papers name."""
+WIDTHS = {
+    "acd_release": 48,
+    "weds": 128,
+    "constant": 1,
+    "hks_diffusionnet": 16,
+    "acd_paper": 140,
+    "add": 256,
+    "geometry_vectors": 150,
+}
 
 
 def test_every_descriptor_of_the_paper_has_a_preset_and_a_number_for_every_set():

@@ -13,6 +13,7 @@ from csm.operators.stencils.anisotropic_laplacians import AnisotropicLaplacians
 from csm.operators.stencils.base import Stencil
 from csm.operators.stencils.edge_splines import EdgeSplines
 from csm.operators.stencils.gradients import VertexGradients
+from csm.operators.stencils.polar_patches import PolarPatches
 from csm.operators.stencils.scaled_laplacian import ScaledLaplacian
 from csm.operators.stencils.wavelets import Wavelets
 
@@ -20,6 +21,7 @@ STENCILS: dict[str, type[Stencil]] = {
     "albo": AnisotropicLaplacians,
     "edge_splines": EdgeSplines,
     "gradients": VertexGradients,
+    "polar_patches": PolarPatches,
     "scaled_laplacian": ScaledLaplacian,
     "wavelets": Wavelets,
 }
