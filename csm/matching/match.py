@@ -49,9 +49,9 @@ def match(
     method
         A descriptor, the name of a preset (the default is csm's own ACD), or a network of `csm.load_model`.
     matcher, refine
-        A matcher or its name, "nearest" or for networks "argmax", and a refiner or its name: "multistart", "joint",
-        "zoomout", "bijective", "icp", "none" (`csm.matching.refinement`); "auto": "joint" for a network, "multistart"
-        for a descriptor.
+        A matcher or its name, "nearest" or for networks "argmax", and a refiner or its name: "multistart",
+        "trusting", "joint", "zoomout", "bijective", "icp", "none" (`csm.matching.refinement`); "auto": "trusting" for
+        a network, "multistart" for a descriptor.
     clean
         "auto" mends copies of the meshes first (`csm.clean`) where they need it; "off" takes them as they are.  The
         result is on the given vertices in either case.

@@ -33,7 +33,7 @@ class NetworkMethod(Method):
         What tables call it; by default what its training was called.
     """
 
-    refine = "joint"  # its nearest neighbours rarely exchange limbs; a search for other starts does so now and then
+    refine = "trusting"  # a search mends exchanged limbs, but a start that the network is sure of needs none
 
     def __init__(self, module: CSMModule, name: str = "") -> None:
         self.module = module

@@ -12,6 +12,7 @@ from csm.matching.refinement.base import Refined, Refiner
 
 PLACES = {
     "multistart": "multistart:Multistart",
+    "trusting": "trusting:Trusting",
     "joint": "joint:Joint",
     "zoomout": "zoomout:ZoomOut",
     "bijective": "zoomout:Bijective",

@@ -29,7 +29,7 @@ def test_a_refiner_stays_and_none_is_none():
 
 @pytest.mark.parametrize("wrong", ["zoomin", 3, ["joint"]])
 def test_what_is_unknown_is_refused_with_what_there_is(wrong):
-    with pytest.raises(ConfigError, match="wanted none, multistart, joint, zoomout, bijective or icp"):
+    with pytest.raises(ConfigError, match="wanted none, multistart, trusting, joint, zoomout, bijective or icp"):
         refiner(wrong)
 
 

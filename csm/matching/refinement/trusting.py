@@ -1,0 +1,69 @@
+"""Refinement that trusts the start where the descriptor does: `joint` there, `multistart` elsewhere.
+
+A network that knows the shapes gives a map that no search improves, and a search may leave it for a wrong one.  On
+shapes that it does not know it exchanges limbs as a descriptor does, and only a search mends that.  Which of the two it
+is shows without ground truth: where nearest neighbours are right they return to their place on the way there and back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
+
+from csm.errors import ConfigError
+from csm.matching.base import Described
+from csm.matching.confidence import share_returning
+from csm.matching.maps import VertexMap
+from csm.matching.refinement.base import RefinedMap, Refiner
+from csm.matching.refinement.joint import Joint
+from csm.matching.refinement.multistart import Multistart
+from csm.matching.signals import SAMPLES
+
+
+@dataclass(frozen=True)
+class Trusting(Refiner):
+    """Refine the start alone where nearest neighbours return there and back, else search for better starts.
+
+    Parameters
+    ----------
+    returning
+        Share of sampled vertices, of either shape, that must return to their place for the start to be trusted.  On 30
+        pairs of the first 80 shapes of remeshed FAUST with the network `humans`, the starts with exchanged limbs had
+        0.96 or less, and of the others all but three had 0.98 or more.
+    joint, search
+        What refines a start that is trusted, and what others.
+
+    Raises
+    ------
+    ConfigError
+        If `returning` is not between 0 and 1.
+
+    Examples
+    --------
+    >>> Trusting().name
+    'trusting'
+    """
+
+    returning: float = 0.98
+    joint: Joint = field(default_factory=Joint)
+    search: Multistart = field(default_factory=Multistart)
+
+    name: ClassVar[str] = "trusting"
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.returning <= 1:
+            raise ConfigError(f"{self}: wanted a share from 0 to 1 for returning")
+
+    def __call__(self, start: VertexMap, source: Described, target: Described) -> RefinedMap:
+        """Return the refined map."""
+        share = returning(source, target)
+        trusted = share >= self.returning
+        done = (self.joint if trusted else self.search)(start, source, target)
+        said = f"{100 * share:.0f} % of the descriptor's nearest neighbours return to their place, so the start was "
+        return replace(done, text=f"{said}{'kept' if trusted else 'searched for'}: {done.text}")
+
+
+def returning(source: Described, target: Described) -> float:
+    """Return how many nearest neighbours return to their place, of the shape where fewer do."""
+    ways = ((source, target), (target, source))
+    return min(share_returning(here.mesh, here.order[:SAMPLES], here.rows, there.rows) for here, there in ways)

@@ -1,0 +1,55 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from csm.errors import ConfigError
+from csm.matching.base import Described
+from csm.matching.maps import VertexMap
+from csm.matching.refinement.base import RefinedMap
+from csm.matching.refinement.joint import Joint
+from csm.matching.refinement.multistart import Multistart
+from csm.matching.refinement.trusting import Trusting, returning
+from csm.matching.way import Way
+from tests.shapes import blob
+
+
+@pytest.fixture
+def pair():
+    """A mesh twice, described by its positions."""
+    mesh = blob(2)
+    features = torch.tensor(mesh.vertices)
+    return Described(mesh, features), Described(mesh, features)
+
+
+def noisy(described: Described, share: float) -> Described:
+    """Return the shape with the descriptors of a share of its vertices exchanged."""
+    rng = np.random.default_rng(0)
+    at = rng.choice(described.mesh.n_vertices, int(share * described.mesh.n_vertices), replace=False)
+    features = described.features.clone()
+    features[at] = described.features[rng.permutation(at)] + 0.3
+    return Described(described.mesh, features)
+
+
+def test_the_share_is_that_of_the_worse_way(pair):
+    assert returning(*pair) == 1
+    here, there = pair[0], noisy(pair[1], 0.3)
+    assert returning(here, there) == returning(there, here) < 0.97
+
+
+@pytest.mark.parametrize(("share", "chosen", "said"), [(0.0, "joint", "kept"), (0.3, "search", "searched for")])
+def test_only_a_start_that_returns_is_trusted(pair, monkeypatch, share, chosen, said):
+    start = VertexMap(np.arange(162), 162)
+    done = {name: RefinedMap(Way(start), text=name) for name in ("joint", "search")}
+    monkeypatch.setattr(Joint, "__call__", lambda *_: done["joint"])
+    monkeypatch.setattr(Multistart, "__call__", lambda *_: done["search"])
+    found = Trusting()(start, pair[0], noisy(pair[1], share))
+    assert found.forward is done[chosen].forward
+    assert f"the start was {said}: {chosen}" in found.text
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.1, float("nan")])
+def test_a_share_is_between_0_and_1(share):
+    with pytest.raises(ConfigError, match="wanted a share from 0 to 1"):
+        Trusting(returning=share)
