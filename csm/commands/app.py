@@ -24,13 +24,14 @@ from csm._signals import exit_status, terminable
 from csm.commands.choices import config_folder
 from csm.commands.explain import explained
 from csm.commands.help import help_text
+from csm.commands.processes import typed_command
 from csm.commands.schema import require_valid
 from csm.commands.words import asks_for_help, to_overrides
 from csm.errors import ConfigError, CsmError
 from csm.evaluation.provenance import remember_command
 from csm.mesh.io import atomic_path
 
-Run = Callable[[DictConfig], dict[str, Any]]
+Run = Callable[[DictConfig], dict[str, Any] | None]
 
 _NO_WORK = ("--cfg", "-c", "--info", "-i", "--hydra-help", "--version", "--shell-completion", "-sc")
 
@@ -47,7 +48,7 @@ def write_json(path: Path, content: Any) -> None:
 
 
 def command(config_name: str, *, folder: bool = False) -> Callable[[Run], Callable[[], Any]]:
-    """Turn ``run(cfg) -> dict of floats`` into a Hydra command.
+    """Turn ``run(cfg) -> dict of floats`` into a Hydra command; a process that only helps another one returns None.
 
     An error that the user can mend is printed as one paragraph and ends the process with status 2; with
     ``debug=true`` its traceback is shown.  Ctrl-C ends it with 130, SIGTERM with 143.  In a multirun a failing job is
@@ -74,7 +75,7 @@ def command(config_name: str, *, folder: bool = False) -> Callable[[Run], Callab
             if asks_for_help(arguments):
                 print(help_text(config_name))
                 return None
-            remember_command(sys.argv)
+            remember_command(typed_command() or sys.argv)
             with _errors_told(config_name, "debug=true" in arguments):
                 sys.argv[1:] = to_overrides(config_name, arguments)
                 with terminable():
@@ -241,6 +242,8 @@ def _job(run: Run, cfg: DictConfig, folder: bool, failures: list[Exception]) -> 
         if text is None or cfg.get("debug"):
             traceback.print_exc()
         print(f"csm: {text or error}", file=sys.stderr)
+        return None
+    if result is None:
         return None
     if folder or sweeping:
         write_json(output_folder() / "result.json", {"status": "ok", **result, **_overrides(sweeping)})

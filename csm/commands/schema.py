@@ -54,6 +54,8 @@ RANGES: Mapping[str, Range] = {
     "debris": Range(False, 0, 1, none=True),
     "tolerance": Range(False, 0, 1),
     "trainer.max_epochs": _COUNT,
+    "trainer.accumulate_grad_batches": _SOME,
+    "trainer.num_nodes": _SOME,
     "trainer.check_val_every_n_epoch": _SOME,
     "trainer.log_every_n_steps": _COUNT,
     "trainer.num_sanity_val_steps": Range(True, -1),

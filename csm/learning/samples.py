@@ -33,7 +33,8 @@ class ShapeSample(NamedTuple):
     """One training shape.
 
     Shapes: `features` (N, P); `surface` with K eigenpairs; `rows` (R,) vertices with a known template point and
-    `classes` (R,) that point of the `template`, which has no name if it is that of the training set.
+    `classes` (R,) that point of the `template`, which has no name if it is that of the training set.  It `counts` in
+    the loss of a validation unless another process has it as well.
     """
 
     name: str
@@ -42,6 +43,7 @@ class ShapeSample(NamedTuple):
     rows: Tensor
     classes: Tensor
     template: str = ""
+    counts: bool = True
 
 
 def network_input(prepared: Prepared) -> NetworkInput:

@@ -117,7 +117,7 @@ def test_the_seed_decides_everything(tmp_path):
 
 def test_settings_that_do_not_fit_are_errors_of_the_user(tmp_path):
     two = partial(L.Trainer, **(QUICK | {"devices": 2}))
-    with pytest.raises(ConfigError, match=r"trainer\.devices=2: csm trains on one device"):
+    with pytest.raises(ConfigError, match=r"trainer\.devices=2, .*several devices train together with trainer=ddp"):
         fit(a_training(tmp_path, trainer=two), tmp_path / "run")
     with pytest.raises(ConfigError, match=r"data\.basis_k=64"):
         fit(a_training(tmp_path, network=NETWORK | {"ks": 64}), tmp_path / "run")
@@ -144,7 +144,7 @@ def test_the_default_callbacks_are_those_of_the_command(tmp_path):
 
 def test_panels_get_the_settings_of_the_training_unless_they_have_some(tmp_path):
     empty, own = TensorBoardPanels(), TensorBoardPanels({"mine": 1})
-    module._make_trainer(a_training(tmp_path, callbacks=[empty, own], settings={"seed": 3}), tmp_path)
+    module.make_trainer(a_training(tmp_path, callbacks=[empty, own], settings={"seed": 3}), tmp_path)
     assert (empty.hparams, own.hparams) == ({"seed": 3}, {"mine": 1})
 
 
@@ -152,7 +152,7 @@ def test_panels_get_the_settings_of_the_training_unless_they_have_some(tmp_path)
 def test_a_bar_is_for_terminals(tmp_path, monkeypatch, terminal, wanted, bar):
     monkeypatch.setattr(sys.stdout, "isatty", lambda: bool(terminal))
     trainer = partial(L.Trainer, **(QUICK | {"enable_progress_bar": bool(wanted)}))
-    made = module._make_trainer(a_training(tmp_path, trainer=trainer), tmp_path)
+    made = module.make_trainer(a_training(tmp_path, trainer=trainer), tmp_path)
     assert isinstance(made.progress_bar_callback, TQDMProgressBar) == bool(bar)
 
 

@@ -1,0 +1,145 @@
+"""Several processes that train one network together, one per device: what they share, and what only the first does.
+
+A process is called by its rank, from 0 on.  All train the same weights, each on its own shapes (see
+`csm.learning.loading`); rank 0 alone prepares the shapes, holds the lock of the folder, logs, prints and exports.
+"""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+from typing import Any, TypeVar
+
+import lightning as L
+import torch
+from lightning.fabric.plugins.environments.lightning import LightningEnvironment
+from lightning.pytorch.strategies import DDPStrategy, StrategyRegistry
+from lightning.pytorch.utilities.seed import isolate_rng
+from torch import distributed
+from torch.nn.parallel import DistributedDataParallel
+
+from csm.errors import ConfigError
+from csm.learning.loading import LightningData
+
+T = TypeVar("T")
+
+NAME = "ranks"
+"""What ``trainer.strategy`` calls `Ranks`."""
+
+_KNOWN = inspect.signature(DistributedDataParallel).parameters
+_OWN_BUFFERS = {"forward_sync_buffers" if "forward_sync_buffers" in _KNOWN else "broadcast_buffers": False}
+_STATISTICS = ("running_mean", "running_var")
+
+
+class Ranks(DDPStrategy):
+    """Lightning's DDP for trainings of csm: gradients are means over the ranks, whose shapes differ in size and parts.
+
+    Random states are those of a training on one device, so that both draw the same order of shapes.  Statistics of
+    batch normalisation stay with their rank between validations, see `SharedStatistics`.
+
+    Parameters
+    ----------
+    options
+        Of Lightning's `DDPStrategy`, such as ``timeout`` or ``process_group_backend``.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self._ddp_kwargs |= _OWN_BUFFERS
+
+    def setup_distributed(self) -> None:
+        """Meet the other ranks; that draws no random numbers and sets no seed."""
+        with isolate_rng():
+            super().setup_distributed()
+
+    def configure_ddp(self) -> None:
+        """Wrap the module; a network with several classifiers uses one of them per shape."""
+        self._ddp_kwargs.setdefault("find_unused_parameters", bool(len(getattr(self.model, "others", ()))))
+        super().configure_ddp()
+
+
+StrategyRegistry.register(NAME, Ranks, description="several devices train one network of csm")
+
+
+class SharedStatistics(L.Callback):
+    """Before a validation and at the end of an epoch, set running means and variances to their means over the ranks."""
+
+    def on_validation_start(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
+        """Share the statistics."""
+        share_statistics(trainer, pl_module)
+
+    def on_train_epoch_end(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
+        """Share the statistics, before the checkpoint is written."""
+        share_statistics(trainer, pl_module)
+
+
+def share_statistics(trainer: L.Trainer, module: torch.nn.Module) -> None:
+    """Set the running means and variances of a module to their means over the ranks."""
+    if trainer.world_size == 1:
+        return
+    for name, buffer in module.named_buffers():
+        if name.endswith(_STATISTICS):
+            buffer.copy_(trainer.strategy.reduce(buffer.clone(), reduce_op="mean"))
+
+
+def require_one_or_ranks(trainer: L.Trainer) -> None:
+    """Raise a ConfigError if a trainer has several devices and another strategy than `Ranks`."""
+    if trainer.world_size > 1 and not isinstance(trainer.strategy, Ranks):
+        raise ConfigError(
+            f"trainer.devices={trainer.num_devices}, trainer.num_nodes={trainer.num_nodes}: several devices train "
+            f'together with trainer=ddp (in Python strategy="{NAME}"), not with {type(trainer.strategy).__name__}; '
+            "set trainer=ddp, or trainer.devices=1 trainer.num_nodes=1"
+        )
+
+
+def is_started_from_outside(trainer: L.Trainer) -> bool:
+    """Tell whether another program, such as srun or torchrun, starts all ranks, so that they can meet at any time."""
+    environment = getattr(trainer.strategy, "cluster_environment", None)
+    return trainer.world_size > 1 and not isinstance(environment, LightningEnvironment)
+
+
+def prepare_once(trainer: L.Trainer, loaded: LightningData) -> None:
+    """Fill the store for the training shapes in one process, while the other ranks wait.
+
+    The first process of every further machine follows: it finds everything in a store that all share.
+    """
+    if not is_started_from_outside(trainer):
+        if trainer.is_global_zero:  # Lightning starts the others after this
+            loaded.prepare_data()
+        loaded.is_prepared = True
+        return
+    trainer.strategy.setup_environment()
+    first_here = trainer.local_rank == 0
+    for turn in (trainer.is_global_zero, first_here and not trainer.is_global_zero):
+        if turn:
+            loaded.prepare_data()
+        trainer.strategy.barrier()
+    loaded.is_prepared = True
+
+
+def require_same_begin(trainer: L.Trainer, begin: Path | None) -> None:
+    """Raise a ConfigError if the ranks do not begin at one checkpoint, as they do not see one folder."""
+    if not is_started_from_outside(trainer):
+        return
+    wanted = trainer.strategy.broadcast(begin and begin.name)
+    if wanted != (begin and begin.name):
+        raise ConfigError(
+            f"rank {trainer.global_rank} sees {begin or 'no checkpoint'} and rank 0 {wanted or 'none'}: all machines "
+            "have to work in one folder that they share; give its path as hydra.run.dir"
+        )
+
+
+def gathered(trainer: L.Trainer, mine: T) -> list[T] | None:
+    """Return on rank 0 what every rank has, in their order; None on the others."""
+    if trainer.world_size == 1:
+        return [mine]
+    found: list[Any] | None = [None] * trainer.world_size if trainer.is_global_zero else None
+    distributed.gather_object(mine, found, dst=0)
+    return found
+
+
+def part(trainer: L.Trainer) -> None:
+    """End the work of the ranks together, once all are here; each goes on, or ends, by itself."""
+    if trainer.world_size > 1 and distributed.is_initialized():
+        trainer.strategy.barrier()
+        distributed.destroy_process_group()
