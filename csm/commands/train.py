@@ -12,6 +12,7 @@ from typing import Any
 
 from hydra import compose
 from hydra.core.hydra_config import HydraConfig
+from hydra.types import RunMode
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
@@ -23,6 +24,7 @@ from csm.commands.processes import is_first, processes_to_start, train_together
 from csm.data.inspection import require_sound
 from csm.errors import ConfigError
 from csm.evaluation.tables import markdown_table
+from csm.experiments.ranks import part
 from csm.experiments.report import write_results
 from csm.experiments.testing import Tested, measure_all, numbers
 from csm.experiments.training import Training, fit
@@ -49,6 +51,8 @@ def run(cfg: DictConfig) -> dict[str, Any] | None:
         tests = counted(len(training.data.split.test), "test shape")
         print(f"{training.name}: {training.data.protocol}; {tests}", flush=True)
     trained = fit(training, folder, cfg.resume)
+    if HydraConfig.get().mode == RunMode.RUN:  # the jobs of a sweep that torchrun started go on together
+        part()
     if trained.rank:
         return None
     print(f"trained for {trained.seconds / 60:.1f} minutes: {trained.checkpoint}")

@@ -7,6 +7,7 @@ A process is called by its rank, from 0 on.  All train the same weights, each on
 from __future__ import annotations
 
 import inspect
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -15,7 +16,7 @@ import torch
 from lightning.fabric.plugins.environments.lightning import LightningEnvironment
 from lightning.pytorch.strategies import DDPStrategy, StrategyRegistry
 from lightning.pytorch.utilities.seed import isolate_rng
-from torch import distributed
+from torch import Tensor, distributed, nn
 from torch.nn.parallel import DistributedDataParallel
 
 from csm.errors import ConfigError
@@ -28,14 +29,13 @@ NAME = "ranks"
 
 _KNOWN = inspect.signature(DistributedDataParallel).parameters
 _OWN_BUFFERS = {"forward_sync_buffers" if "forward_sync_buffers" in _KNOWN else "broadcast_buffers": False}
-_STATISTICS = ("running_mean", "running_var")
 
 
 class Ranks(DDPStrategy):
     """Lightning's DDP for trainings of csm: gradients are means over the ranks, whose shapes differ in size and parts.
 
     Random states are those of a training on one device, so that both draw the same order of shapes.  Statistics of
-    batch normalisation stay with their rank between validations, see `SharedStatistics`.
+    batch normalisation are left to `SharedStatistics`.
 
     Parameters
     ----------
@@ -62,24 +62,42 @@ StrategyRegistry.register(NAME, Ranks, description="several devices train one ne
 
 
 class SharedStatistics(L.Callback):
-    """Before a validation and at the end of an epoch, set running means and variances to their means over the ranks."""
+    r"""Running statistics of batch normalisation over the shapes of all ranks, in the order of one process.
 
-    def on_validation_start(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
-        """Share the statistics."""
-        share_statistics(trainer, pl_module)
+    From the statistics r before a step, rank k has made (1 - m) r + m s_k with those of its shape, s_k, and the
+    momentum m.  One process would have gone on from rank to rank:
 
-    def on_train_epoch_end(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
-        """Share the statistics, before the checkpoint is written."""
-        share_statistics(trainer, pl_module)
+    .. math::
+        r \leftarrow (1 - m) r + m s_k, \qquad k = 0 .. W - 1
+    """
+
+    def __init__(self) -> None:
+        self._before: list[Tensor] = []
+
+    def on_train_batch_start(self, trainer: L.Trainer, pl_module: L.LightningModule, *args: Any) -> None:
+        """Keep the statistics before the step."""
+        if trainer.world_size > 1:
+            self._before = [x.clone() for x, _ in running_statistics(pl_module)]
+
+    def on_train_batch_end(self, trainer: L.Trainer, pl_module: L.LightningModule, *args: Any) -> None:
+        """Go on from rank to rank."""
+        if trainer.world_size == 1 or not self._before:
+            return
+        own = [x for x, _ in running_statistics(pl_module)]
+        every = torch.split(trainer.strategy.all_gather(torch.cat(own)), [len(x) for x in own], dim=1)
+        for (x, keep), before, made in zip(running_statistics(pl_module), self._before, every, strict=True):
+            x.copy_(before)
+            for added in made - keep * before:
+                x.mul_(keep).add_(added)
 
 
-def share_statistics(trainer: L.Trainer, module: torch.nn.Module) -> None:
-    """Set the running means and variances of a module to their means over the ranks."""
-    if trainer.world_size == 1:
-        return
-    for name, buffer in module.named_buffers():
-        if name.endswith(_STATISTICS):
-            buffer.copy_(trainer.strategy.reduce(buffer.clone(), reduce_op="mean"))
+def running_statistics(module: nn.Module) -> Iterator[tuple[Tensor, float]]:
+    """Yield running means and variances, shape (C,), and which part of them a new shape leaves as it is."""
+    for part in module.modules():
+        if isinstance(part, nn.BatchNorm1d) and part.running_mean is not None and part.running_var is not None:
+            keep = 1 - float(part.momentum or 0)
+            yield part.running_mean, keep
+            yield part.running_var, keep
 
 
 def require_one_or_ranks(trainer: L.Trainer) -> None:
@@ -138,8 +156,8 @@ def gathered(trainer: L.Trainer, mine: T) -> list[T] | None:
     return found
 
 
-def part(trainer: L.Trainer) -> None:
-    """End the work of the ranks together, once all are here; each goes on, or ends, by itself."""
-    if trainer.world_size > 1 and distributed.is_initialized():
-        trainer.strategy.barrier()
+def part() -> None:
+    """Leave the other ranks for good, once all are here; without others nothing happens."""
+    if distributed.is_initialized():
+        distributed.barrier()
         distributed.destroy_process_group()

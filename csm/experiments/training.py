@@ -30,7 +30,6 @@ from csm.evaluation.provenance import provenance
 from csm.experiments.callbacks import EpochLines, FiniteLoss, ValidationErrors
 from csm.experiments.ranks import (
     SharedStatistics,
-    part,
     prepare_once,
     require_one_or_ranks,
     require_same_begin,
@@ -153,7 +152,6 @@ def _fit(training: Training, trainer: L.Trainer, folder: Path, resume: Path | st
     if trainer.is_global_zero:
         export_module(module, folder / "export")
     measured = {key: float(value) for key, value in trainer.callback_metrics.items()}
-    part(trainer)
     return Trained(module, checkpoint, seconds, measured, trainer.global_rank)
 
 

@@ -152,8 +152,9 @@ class CSMModule(L.LightningModule):
     def validation_step(self, sample: ShapeSample) -> Tensor:
         """Return the learned descriptor of one shape; the loss is logged, the errors are a callback's business."""
         descriptor: Tensor = self(sample.features, sample.surface)
-        loss, counts = self.loss(descriptor, sample), int(sample.counts)
-        self.log("val/loss", loss, prog_bar=True, batch_size=counts, sync_dist=True)
+        loss = self.loss(descriptor, sample)
+        weight = int(sample.counts) * self.trainer.world_size  # Lightning's mean of weights over the ranks is whole
+        self.log("val/loss", loss, prog_bar=True, batch_size=weight, sync_dist=True)
         return descriptor
 
     @torch.no_grad()
