@@ -98,7 +98,7 @@ def train_together(processes: int, folder: Path) -> dict[str, Any]:
             "the others were stopped; what it said above tells why"
         ) from None
     found: dict[str, Any] = json.loads(result.read_text())
-    return {key: value for key, value in found.items() if key not in ("status", "overrides")}
+    return {key: value for key, value in found.items() if key not in ("status", "overrides", "settings")}
 
 
 def job_words(folder: Path) -> list[str]:

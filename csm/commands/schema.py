@@ -50,6 +50,8 @@ _COUNT, _SOME = Range(True, 0), Range(True, 1)
 RANGES: Mapping[str, Range] = {
     "seed": Range(True, 0, 2**32 - 1),
     "workers": Range(True, 0, none=True),
+    "shards": _SOME,
+    "shard": _COUNT,
     "unused_days": Range(False, 0, none=True),
     "debris": Range(False, 0, 1, none=True),
     "tolerance": Range(False, 0, 1),

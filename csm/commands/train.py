@@ -123,4 +123,4 @@ def conclude(cfg: DictConfig, tested: list[Tested], notes: str) -> None:
     print(f"table:        {folder / 'rows.json'}, rows.csv\nreport:       {page}")
 
 
-main = command("train", folder=True)(run)
+main = command("train", folder=True, kept=("model.ckpt", "export/model.json"))(run)

@@ -124,10 +124,12 @@ class LightningData(L.LightningDataModule):
         """Return the validation shapes in order, or the share of this process in them.
 
         What is there again, so that all processes have as many, does not count: all together count each shape once.
+        (Lightning rounds the mean of these weights over W processes to a whole number, so one shape has weight W.)
         """
         names, (rank, ranks) = self.data.validation_names, self.share
-        shared = enumerate(self.share.of(range(len(names))))
-        return self._loader([self.sample(names[j])._replace(counts=rank + i * ranks < len(names)) for i, j in shared])
+        mine = enumerate(self.share.of(range(len(names))))
+        weights = ((names[j], ranks if rank + i * ranks < len(names) else 0) for i, j in mine)
+        return self._loader([self.sample(name)._replace(counts=weight) for name, weight in weights])
 
     def _loader(self, samples: Sequence[ShapeSample], **how: Any) -> DataLoader[ShapeSample]:
         return DataLoader(samples, batch_size=None, **how)  # type: ignore[arg-type]

@@ -153,8 +153,7 @@ class CSMModule(L.LightningModule):
         """Return the learned descriptor of one shape; the loss is logged, the errors are a callback's business."""
         descriptor: Tensor = self(sample.features, sample.surface)
         loss = self.loss(descriptor, sample)
-        weight = int(sample.counts) * self.trainer.world_size  # Lightning's mean of weights over the ranks is whole
-        self.log("val/loss", loss, prog_bar=True, batch_size=weight, sync_dist=True)
+        self.log("val/loss", loss, prog_bar=True, batch_size=sample.counts, sync_dist=True)
         return descriptor
 
     @torch.no_grad()

@@ -83,7 +83,7 @@ def main(folder: Path) -> None:
 def run(folder: Path) -> subprocess.CompletedProcess[str]:
     """Run `main` in two processes."""
     how = ["-m", "torch.distributed.run", "--standalone", "--nproc-per-node=2", "-m", "tests.experiments.two_ranks"]
-    return subprocess.run([sys.executable, *how, str(folder)], text=True, capture_output=True, timeout=300)
+    return subprocess.run([sys.executable, *how, str(folder)], text=True, capture_output=True, timeout=900)
 
 
 if __name__ == "__main__":
