@@ -82,7 +82,7 @@ class FiniteLoss(L.Callback):
     """
 
     def __init__(self) -> None:
-        self._pending: deque[_Step] = deque()
+        self.pending: deque[_Step] = deque()
 
     def on_train_batch_end(
         self, trainer: L.Trainer, pl_module: L.LightningModule, outputs: Any, batch: Any, batch_idx: int
@@ -93,14 +93,14 @@ class FiniteLoss(L.Callback):
             return
         rate = trainer.optimizers[0].param_groups[0]["lr"]
         where = f"in epoch {trainer.current_epoch + 1}, step {batch_idx + 1} (shape {batch.name})"
-        self._pending.append(_Step(loss.detach(), f"{where}, at a learning rate of {rate:.3g}"))
-        while self._pending and self._pending[0].is_there():
-            self._look(self._pending.popleft())
+        self.pending.append(_Step(loss.detach(), f"{where}, at a learning rate of {rate:.3g}"))
+        while self.pending and self.pending[0].is_there():
+            self._look(self.pending.popleft())
 
     def on_train_epoch_end(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
         """Look at the losses that are left."""
-        while self._pending:
-            self._look(self._pending.popleft())
+        while self.pending:
+            self._look(self.pending.popleft())
 
     def _look(self, step: _Step) -> None:
         value = step.value()

@@ -21,26 +21,12 @@ from tests.experiments.toys import a_training
 from tests.learning.toys import QUICK
 from tests.toyset import write_toys
 
-SMALL = [
-    "data=folder",
-    "data.root=toys",
-    "data.n_test=2",
-    "data.basis_k=24",
-    "descriptor=acd_paper",
-    "descriptor.angles=4",
-    "descriptor.k=8",
-    "descriptor.order=3",
-    "model=csmcnn_paper",
-    "model.channels=[16,16]",
-    "model.descriptor_channels=24",
-    "model.ks=20",
-    "model.terms=4",
-    "trainer=ddp",
-    "trainer.devices=2",
-    "trainer.accelerator=cpu",
-    "workers=0",
-    "logger=csv",
-]
+SMALL = (
+    *("data=folder", "data.root=toys", "data.n_test=2", "data.basis_k=24", "workers=0", "logger=csv"),
+    *("descriptor=acd_paper", "descriptor.angles=4", "descriptor.k=8", "descriptor.order=3"),
+    *("model=csmcnn_paper", "model.channels=[16,16]", "model.descriptor_channels=24", "model.ks=20", "model.terms=4"),
+    *("trainer=ddp", "trainer.devices=2", "trainer.accelerator=cpu"),
+)
 
 
 def start(folder, *words) -> subprocess.Popen[str]:
