@@ -25,7 +25,7 @@ from csm._signals import exit_status, terminable
 from csm.commands.choices import config_folder
 from csm.commands.explain import explained
 from csm.commands.help import help_text
-from csm.commands.processes import typed_command
+from csm.commands.processes import end_with_parent, is_first, typed_command
 from csm.commands.schema import require_valid
 from csm.commands.words import asks_for_help, to_overrides
 from csm.errors import ConfigError, CsmError
@@ -79,7 +79,9 @@ def command(config_name: str, *, folder: bool = False, kept: Sequence[str] = ())
             if asks_for_help(arguments):
                 print(help_text(config_name))
                 return None
-            remember_command(typed_command() or sys.argv)
+            if typed := typed_command():
+                end_with_parent()
+            remember_command(typed or sys.argv)
             with _errors_told(config_name, "debug=true" in arguments):
                 sys.argv[1:] = to_overrides(config_name, arguments)
                 with terminable():
@@ -141,6 +143,9 @@ def _in_own_folder(main: Callable[[], Any], config_name: str) -> Any:
     if any(argument in _NO_WORK for argument in arguments):
         return main()
     given = next((argument.partition("=")[2] for argument in arguments if argument.startswith(f"{key}=")), None)
+    if given is not None and "trainer=ddp" in arguments and not is_first():
+        sys.argv += ["hydra.output_subdir=null", "hydra/job_logging=stdout"]  # the first process has the folder
+        return main()
     if given is not None:
         return _in_given_folder(main, Path(given.strip("'\"")), config_name, sweeping)
     made = new_folder(Path("outputs") / (f"{config_name}_sweep" if sweeping else config_name))

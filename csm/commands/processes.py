@@ -37,6 +37,14 @@ def typed_command() -> list[str] | None:
     return json.loads(os.environ[_TYPED]) if _TYPED in os.environ else None
 
 
+def end_with_parent() -> None:
+    """Let SIGTERM end this process when the command that started it is killed (on Linux)."""
+    if sys.platform == "linux":
+        import ctypes
+
+        ctypes.CDLL(None).prctl(1, signal.SIGTERM)  # PR_SET_PDEATHSIG
+
+
 def is_first() -> bool:
     """Tell whether this process speaks for all that were started together; a process alone does."""
     return next((os.environ[name] for name in _RANKS if name in os.environ), "0") == "0"
@@ -89,7 +97,7 @@ def train_together(processes: int, folder: Path) -> dict[str, Any]:
     result.unlink(missing_ok=True)
     words = job_words(folder)
     try:
-        with saying(lambda: f"what its {processes} processes have said above"), _watched():
+        with saying(lambda: f"its {processes} processes say above what is kept"), _watched(processes):
             elastic_launch(config, sys.executable)("-m", "csm.commands.train", *words)
     except ChildFailedError as error:
         rank, failure = error.get_first_failure()
@@ -116,11 +124,13 @@ def job_words(folder: Path) -> list[str]:
 
 
 @contextmanager
-def _watched() -> Iterator[None]:
+def _watched(processes: int) -> Iterator[None]:
     """Run PyTorch's launcher with its log quiet, and put what it turns signals into back into words of csm."""
     from torch.distributed.elastic.multiprocessing.api import SignalException
 
+    before = dict(os.environ)
     os.environ[_TYPED] = json.dumps(remembered_command())
+    os.environ.setdefault("OMP_NUM_THREADS", str(max(1, (os.cpu_count() or 1) // processes)))
     handlers = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT)}
     logging.getLogger("torch.distributed.elastic").setLevel(logging.CRITICAL)
     try:
@@ -128,6 +138,7 @@ def _watched() -> Iterator[None]:
     except SignalException as stop:
         raise (Terminated if stop.sigval == signal.SIGTERM else Stopped)() from None
     finally:
-        del os.environ[_TYPED]
+        os.environ.clear()
+        os.environ.update(before)
         for number, handler in handlers.items():
             signal.signal(number, handler)

@@ -24,7 +24,7 @@ from csm.commands.processes import is_first, processes_to_start, train_together
 from csm.data.inspection import require_sound
 from csm.errors import ConfigError
 from csm.evaluation.tables import markdown_table
-from csm.experiments.ranks import part
+from csm.experiments.ranks import NAME, part
 from csm.experiments.report import write_results
 from csm.experiments.testing import Tested, measure_all, numbers
 from csm.experiments.training import Training, fit
@@ -47,7 +47,7 @@ def run(cfg: DictConfig) -> dict[str, Any] | None:
     require_sound(training.data, test=cfg.test, exact=protocol.distance == "exact" and not protocol.fallback)
     if processes := processes_to_start(training, folder):
         return train_together(processes, folder)
-    if is_first():
+    if is_first() or cfg.trainer.get("strategy") != NAME:
         tests = counted(len(training.data.split.test), "test shape")
         print(f"{training.name}: {training.data.protocol}; {tests}", flush=True)
     trained = fit(training, folder, cfg.resume)

@@ -135,15 +135,16 @@ def prepare_once(trainer: L.Trainer, loaded: LightningData) -> None:
     loaded.is_prepared = True
 
 
-def require_same_begin(trainer: L.Trainer, begin: Path | None) -> None:
-    """Raise a ConfigError if the ranks do not begin at one checkpoint, as they do not see one folder."""
+def require_same_begin(trainer: L.Trainer, folder: Path, begin: Path | None) -> None:
+    """Raise a ConfigError if the ranks do not work in one folder, or do not see the same checkpoint to begin at."""
     if not is_started_from_outside(trainer):
         return
-    wanted = trainer.strategy.broadcast(begin and begin.name)
-    if wanted != (begin and begin.name):
+    mine = f"in {folder.absolute()}, from {begin.name if begin else 'the beginning'}"
+    first = trainer.strategy.broadcast(mine)
+    if first != mine:
         raise ConfigError(
-            f"rank {trainer.global_rank} sees {begin or 'no checkpoint'} and rank 0 {wanted or 'none'}: all machines "
-            "have to work in one folder that they share; give its path as hydra.run.dir"
+            f"rank {trainer.global_rank} would train {mine}, and rank 0 {first}: all processes have to work in one "
+            "folder that all machines share; give its path: hydra.run.dir=PATH"
         )
 
 

@@ -136,7 +136,7 @@ def _fit(training: Training, trainer: L.Trainer, folder: Path, resume: Path | st
         require_same_settings(begin, draft, trainer.max_epochs)
     loaded = LightningData(training.data)
     prepare_once(trainer, loaded)
-    require_same_begin(trainer, begin)
+    require_same_begin(trainer, folder, begin)
     module = make_module(training, loaded.n_features, trainer.max_epochs, shapes_per_step(trainer))
     if module.inputs is not None:
         module.inputs.learn(sample.features for sample in loaded.fitted())

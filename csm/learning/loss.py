@@ -7,6 +7,8 @@ from typing import Any, Literal
 import torch
 from torch import Tensor
 
+from csm.networks.sparse import without_autocast
+
 Products = Literal["float32", "bfloat16"]
 
 
@@ -63,7 +65,7 @@ def linear_cross_entropy(
     if products not in ("float32", "bfloat16"):
         raise ValueError(f'products is "float32" or "bfloat16", got {products!r}')
     low_precision = products == "bfloat16" or _is_autocast_to_bfloat16(x.device.type)
-    with torch.autocast(x.device.type, enabled=False):  # it would also round the softmax
+    with without_autocast(x):  # it would also round the softmax
         loss: Tensor = _LinearCrossEntropy.apply(  # type: ignore[no-untyped-call]
             x.to(weight.dtype), weight, bias, target, chunk, low_precision, torch.is_grad_enabled()
         )
@@ -71,6 +73,8 @@ def linear_cross_entropy(
 
 
 def _is_autocast_to_bfloat16(device: str) -> bool:
+    if not torch.amp.is_autocast_available(device):
+        return False
     return torch.is_autocast_enabled(device) and torch.get_autocast_dtype(device) == torch.bfloat16
 
 

@@ -14,6 +14,7 @@ from types import SimpleNamespace
 import lightning as L
 import pytest
 
+from csm._locks import locked
 from csm.commands.processes import is_first, job_words, processes_to_start, typed_command
 from csm.errors import ConfigError
 from tests.experiments import two_ranks
@@ -69,7 +70,7 @@ def test_a_process_that_fails_ends_all_and_says_why(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of Unix")
-def test_sigterm_ends_all_and_the_same_command_goes_on(tmp_path):
+def test_sigterm_and_a_kill_end_all_and_the_same_command_goes_on(tmp_path):
     words = ("trainer.max_epochs=400", "hydra.run.dir=run", "test=false")
     ran, last = start(tmp_path, *words), tmp_path / "run/checkpoints/last.ckpt"
     end = time.monotonic() + 900
@@ -82,8 +83,10 @@ def test_sigterm_ends_all_and_the_same_command_goes_on(tmp_path):
     assert "Traceback" not in errors
     again = start(tmp_path, *words)
     first = next(line for line in again.stdout if line.startswith("epoch"))
-    again.send_signal(signal.SIGTERM)
+    again.kill()
     again.communicate(timeout=300)
+    with locked(tmp_path / "run", wait=300):  # nobody works there any more
+        assert last.exists()
     assert not first.startswith("epoch 1 of")
 
 

@@ -119,12 +119,14 @@ def test_other_strategies_of_several_devices_are_refused(tmp_path):
     require_one_or_ranks(trainer)
 
 
-def test_ranks_that_do_not_see_one_folder_are_refused(tmp_path):
-    strategy = SimpleNamespace(broadcast=lambda mine: "last.ckpt", cluster_environment=None)
+def test_ranks_that_do_not_work_in_one_folder_are_refused(tmp_path):
+    first = f"in {tmp_path}, from last.ckpt"
+    strategy = SimpleNamespace(broadcast=lambda mine: first, cluster_environment=None)
     trainer = SimpleNamespace(strategy=strategy, world_size=2, global_rank=1)
-    require_same_begin(trainer, tmp_path / "last.ckpt")
-    with pytest.raises(ConfigError, match=r"rank 1 sees no checkpoint and rank 0 last\.ckpt"):
-        require_same_begin(trainer, None)
+    require_same_begin(trainer, tmp_path, tmp_path / "last.ckpt")
+    for folder, begin in ((tmp_path, None), (tmp_path / "other", tmp_path / "last.ckpt")):
+        with pytest.raises(ConfigError, match=r"rank 1 would train in .*, and rank 0 in .*last\.ckpt"):
+            require_same_begin(trainer, folder, begin)
 
 
 def test_running_statistics_go_on_from_rank_to_rank():
