@@ -279,8 +279,6 @@ def test_prepare_fills_checks_and_prunes(bench, capsys):
         ("check", ["folder=nowhere"], "nowhere"),
         ("matrix", [], "rows"),
         ("prepare", ["action=dance"], "fill, check or prune"),
-        ("prepare", [*SMALL, "data.root=toys", "shards=2", "shard=2"], "the first of 2 parts is 0 and the last 1"),
-        ("matrix", ["+rows.a=[trainer.devices=2]"], "each row of a matrix is trained on one device"),
     ],
 )
 def test_errors_are_one_paragraph_and_status_2(bench, capsys, command, arguments, message):

@@ -96,7 +96,7 @@ def test_how_many_processes_a_training_wants(tmp_path, monkeypatch):
     nodes = partial(L.Trainer, **(QUICK | {"devices": 2, "num_nodes": 3, "strategy": "ranks"}))
     with pytest.raises(ConfigError, match=r"srun --nodes=3 --ntasks-per-node=2 csm train"):
         processes_to_start(a_training(tmp_path, trainer=nodes), tmp_path)
-    for name, value in {"RANK": 1, "LOCAL_RANK": 1, "WORLD_SIZE": 2, "TORCHELASTIC_RUN_ID": "x"}.items():
+    for name, value in {"RANK": 0, "LOCAL_RANK": 0, "WORLD_SIZE": 2, "TORCHELASTIC_RUN_ID": "x"}.items():
         monkeypatch.setenv(name, str(value))
     assert processes_to_start(two_ranks.training(tmp_path, 1, 2), tmp_path) == 0
 
