@@ -32,7 +32,7 @@ def locked(path: str | os.PathLike[str], *, wait: float = WAIT) -> Iterator[None
         The file, or the folder, which has to exist.  Links are followed: all names of a file have one lock.
     wait
         Seconds to wait for another process: the default is for a short read-change-write of a file; 0 refuses at once,
-        for a folder in which a training or a matrix runs.
+        for what a training or a row of a matrix works on.
 
     Raises
     ------
@@ -83,6 +83,6 @@ def _refusal(path: str | os.PathLike[str], wait: float) -> str:
             "wait until it has ended, or choose another folder"
         )
     return (
-        f"{path}: another run of csm has kept this file locked for {wait:g} s; "
+        f"{path}: another run of csm has kept this file locked{f' for {wait:g} s' if wait else ''}; "
         "wait until it has ended, or choose another file"
     )

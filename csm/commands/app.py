@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import hashlib
 import json
 import logging
 import os
@@ -24,13 +25,14 @@ from csm._signals import exit_status, terminable
 from csm.commands.choices import config_folder
 from csm.commands.explain import explained
 from csm.commands.help import help_text
+from csm.commands.processes import end_with_parent, is_first, typed_command
 from csm.commands.schema import require_valid
 from csm.commands.words import asks_for_help, to_overrides
 from csm.errors import ConfigError, CsmError
 from csm.evaluation.provenance import remember_command
 from csm.mesh.io import atomic_path
 
-Run = Callable[[DictConfig], dict[str, Any]]
+Run = Callable[[DictConfig], dict[str, Any] | None]
 
 _NO_WORK = ("--cfg", "-c", "--info", "-i", "--hydra-help", "--version", "--shell-completion", "-sc")
 
@@ -46,8 +48,8 @@ def write_json(path: Path, content: Any) -> None:
         temporary.write_text(json.dumps(content, indent=1, allow_nan=True) + "\n")
 
 
-def command(config_name: str, *, folder: bool = False) -> Callable[[Run], Callable[[], Any]]:
-    """Turn ``run(cfg) -> dict of floats`` into a Hydra command.
+def command(config_name: str, *, folder: bool = False, kept: Sequence[str] = ()) -> Callable[[Run], Callable[[], Any]]:
+    """Turn ``run(cfg) -> dict of floats`` into a Hydra command; a process that only helps another one returns None.
 
     An error that the user can mend is printed as one paragraph and ends the process with status 2; with
     ``debug=true`` its traceback is shown.  Ctrl-C ends it with 130, SIGTERM with 143.  In a multirun a failing job is
@@ -59,6 +61,9 @@ def command(config_name: str, *, folder: bool = False) -> Callable[[Run], Callab
         Name of its yaml, and of the command.
     folder
         Whether a job has a folder of its own, with ``result.json`` of what it returned.
+    kept
+        Files in that folder that a finished job leaves: a sweep that is started again in its folder does not do a job
+        again whose settings are the same and whose files are there.
     """
 
     def decorate(run: Run) -> Callable[[], Any]:
@@ -67,14 +72,16 @@ def command(config_name: str, *, folder: bool = False) -> Callable[[Run], Callab
         @hydra.main(version_base="1.3", config_path=str(config_folder()), config_name=config_name)
         @functools.wraps(run)
         def main(cfg: DictConfig) -> Any:
-            return _job(run, cfg, folder, failures)
+            return _job(run, cfg, folder, failures, kept)
 
         def entry() -> Any:
             arguments = sys.argv[1:]
             if asks_for_help(arguments):
                 print(help_text(config_name))
                 return None
-            remember_command(sys.argv)
+            if typed := typed_command():
+                end_with_parent()
+            remember_command(typed or sys.argv)
             with _errors_told(config_name, "debug=true" in arguments):
                 sys.argv[1:] = to_overrides(config_name, arguments)
                 with terminable():
@@ -136,6 +143,9 @@ def _in_own_folder(main: Callable[[], Any], config_name: str) -> Any:
     if any(argument in _NO_WORK for argument in arguments):
         return main()
     given = next((argument.partition("=")[2] for argument in arguments if argument.startswith(f"{key}=")), None)
+    if given is not None and "trainer=ddp" in arguments and not is_first():
+        sys.argv += ["hydra.output_subdir=null", "hydra/job_logging=stdout"]  # the first process has the folder
+        return main()
     if given is not None:
         return _in_given_folder(main, Path(given.strip("'\"")), config_name, sweeping)
     made = new_folder(Path("outputs") / (f"{config_name}_sweep" if sweeping else config_name))
@@ -220,13 +230,39 @@ def _remove_if_bare(folder: Path) -> None:
             return
 
 
-def _overrides(sweeping: bool) -> dict[str, list[str]]:
-    return {"overrides": [str(text) for text in HydraConfig.get().overrides.task]} if sweeping else {}
+def _of_sweep(cfg: DictConfig, sweeping: bool) -> dict[str, Any]:
+    """Return what the record of a job of a sweep has besides: its options, and a digest of all settings."""
+    if not sweeping:
+        return {}
+    return {"overrides": [str(text) for text in HydraConfig.get().overrides.task], "settings": _settings(cfg)}
 
 
-def _job(run: Run, cfg: DictConfig, folder: bool, failures: list[Exception]) -> Any:
+def _settings(cfg: DictConfig) -> str:
+    """Return a digest of all settings of a job; empty if a reference among them leads nowhere."""
+    try:
+        text = OmegaConf.to_yaml(cfg, resolve=True, sort_keys=True)
+    except OmegaConfBaseException:
+        return ""
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _finished(cfg: DictConfig, kept: Sequence[str]) -> dict[str, Any] | None:
+    """Return what a job of these settings left here, if an earlier run of the sweep has finished it."""
+    here = output_folder()
+    try:
+        record: dict[str, Any] = json.loads((here / "result.json").read_text())
+    except (OSError, ValueError):
+        return None
+    same = record.get("status") == "ok" and record.get("settings") == _settings(cfg)
+    return record if kept and same and all((here / name).exists() for name in kept) else None
+
+
+def _job(run: Run, cfg: DictConfig, folder: bool, failures: list[Exception], kept: Sequence[str] = ()) -> Any:
     """Run one job; a failure goes to `failures`, in a sweep it is kept in the job's folder and the others go on."""
     sweeping = HydraConfig.get().mode == RunMode.MULTIRUN
+    if sweeping and (found := _finished(cfg, kept)) is not None:
+        print(f"{output_folder()}: was finished by an earlier run of this sweep")
+        return found.get("objective")
     try:
         require_valid(cfg)
         result = run(cfg)
@@ -234,7 +270,7 @@ def _job(run: Run, cfg: DictConfig, folder: bool, failures: list[Exception]) -> 
         text = explained(error, str(HydraConfig.get().job.config_name))
         if folder or sweeping:
             record = {"status": "failed", "error": text or str(error), "kind": type(error).__name__}
-            write_json(output_folder() / "result.json", {**record, **_overrides(sweeping)})
+            write_json(output_folder() / "result.json", {**record, **_of_sweep(cfg, sweeping)})
         if not sweeping:
             failures.append(error)
             return None
@@ -242,6 +278,8 @@ def _job(run: Run, cfg: DictConfig, folder: bool, failures: list[Exception]) -> 
             traceback.print_exc()
         print(f"csm: {text or error}", file=sys.stderr)
         return None
+    if result is None:
+        return None
     if folder or sweeping:
-        write_json(output_folder() / "result.json", {"status": "ok", **result, **_overrides(sweeping)})
+        write_json(output_folder() / "result.json", {"status": "ok", **result, **_of_sweep(cfg, sweeping)})
     return result.get("objective")

@@ -26,6 +26,7 @@ from csm.experiments._moved import MOVED
 
 _EXTRAS = {
     "joblib": "sweep",
+    "ray": "sweep",
     "submitit_local": "sweep",
     "submitit_slurm": "sweep",
     "optuna": "sweep",
@@ -96,7 +97,7 @@ def _explained(error: BaseException, config_name: str) -> str | None:
         return f"there is not enough memory ({error}); use fewer workers, smaller meshes, or another descriptor"
     if isinstance(error, zipfile.BadZipFile):
         return f"an archive is damaged ({error})"
-    return _of_torch(error)
+    return _of_torch(error) or _of_launchers(type(error).__name__, str(error))
 
 
 def _of_the_system(error: OSError) -> str:
@@ -193,6 +194,21 @@ def _flat(node: Any, above: str = "") -> Iterator[str]:
         yield from _flat(value, f"{name}.")
 
 
+def _of_launchers(kind: str, text: str) -> str | None:
+    """Explain errors of the libraries that run the jobs of a sweep."""
+    if 'Could not detect "srun"' in text:
+        return (
+            "hydra/launcher=submitit_slurm: there is no Slurm on this machine (no srun); start the sweep where jobs "
+            "are submitted, or take hydra/launcher=submitit_local, joblib or ray"
+        )
+    if kind in ("TerminatedWorkerError", "WorkerCrashedError", "UncompletedJobError"):
+        return (
+            "a process of the sweep was ended from outside, perhaps because memory ran out; what its jobs have "
+            "finished is kept, and the same command with the same folder (hydra.sweep.dir) goes on from there"
+        )
+    return None
+
+
 def _of_torch(error: BaseException) -> str | None:
     """Explain errors of PyTorch and Lightning, by their names: neither is imported by commands that do without."""
     kind, text = type(error).__name__, str(error)
@@ -201,6 +217,8 @@ def _of_torch(error: BaseException) -> str | None:
         return f"the trainer refuses its settings: {first}"
     if kind in ("OutOfMemoryError", "AcceleratorError") or "out of memory" in text:
         return f"the graphics card cannot do this: {first}; choose device=cpu and trainer=cpu, or smaller meshes"
+    if re.search(r"Connection closed by peer|Connection reset by peer|gloo::|NCCL", text):
+        return f"another process that trains together with this one has ended, and says above why ({first})"
     no_card = r"No CUDA GPUs|Found no NVIDIA driver|not compiled with CUDA"
     if isinstance(error, RuntimeError) and re.search(no_card, text):
         return f"there is no graphics card that PyTorch can use ({first}); choose device=cpu and trainer=cpu"

@@ -77,6 +77,11 @@ def _row(cfg: DictConfig, name: str, seed: int) -> Row:
     with open_dict(train):
         train.update(name=name, seed=seed, store=cfg.store, workers=cfg.workers)
     require_valid(train)
+    if train.trainer.devices not in (1, "1") or train.trainer.get("num_nodes", 1) != 1:
+        raise ConfigError(
+            f"row {name}: trainer.devices={train.trainer.devices}; each row of a matrix is trained on one device, and "
+            "several rows at once by several jobs, as in csm matrix -m only=[a],[b] hydra/launcher=ray"
+        )
     return Row(name, seed, partial(make_training, train), identity_of(train))
 
 
@@ -86,9 +91,10 @@ def identity_of(cfg: DictConfig) -> dict[str, Any]:
     found: dict[str, Any] = {"seed": settings["seed"]}
     for group in ("data", "descriptor", "model", "optimizer", "learning"):
         found |= {f"{group}.{key}": value for key, value in settings[group].items() if key not in _PLACES}
-    return found | {
-        f"trainer.{key}": settings["trainer"][key] for key in ("max_epochs", "max_time", "gradient_clip_val")
-    }
+    trainer = settings["trainer"]
+    found |= {f"trainer.{key}": trainer[key] for key in ("max_epochs", "max_time", "gradient_clip_val", "precision")}
+    per_step = trainer["accumulate_grad_batches"]
+    return found | {"trainer.accumulate_grad_batches": per_step if per_step > 1 else None}
 
 
 main = command("matrix", folder=True)(run)

@@ -32,7 +32,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     if cfg.action != "fill":
         raise ConfigError(f"action={cfg.action}: wanted fill, check or prune")
     data = make_data(cfg)
-    summary = fill_store(data, all_jobs(data), cfg.workers)
+    summary = fill_store(data, shard_of(all_jobs(data), cfg.shard, cfg.shards), cfg.workers)
     if summary.failures:
         raise DataError(
             f"{counted(len(summary.failures), 'shape')} cannot be prepared; the others are in the "
@@ -49,10 +49,32 @@ def _existing_store(root: str | None) -> Store:
 
 
 def all_jobs(data: DataModule) -> list[Job]:
-    """Return every training and test shape of a data module, each once."""
+    """Return every training and test shape of a data module, each once, in an order that is always the same."""
     train = [Job(data.train_set, name) for name in data.train_names()]
+    train += [Job(more.shapes, name) for more in data.also for name in more.names]
     test = [Job(shapes, name) for shapes in data.test_sets.values() for name in data.test_names(shapes)]
     return list({job.label: job for job in [*train, *test]}.values())
+
+
+def shard_of(jobs: list[Job], shard: int, shards: int) -> list[Job]:
+    """Return the part of all shapes that one of several jobs prepares: every `shards`-th, from number `shard` on.
+
+    Raises
+    ------
+    ConfigError
+        If there is no such part.
+
+    Examples
+    --------
+    >>> [shard_of([0, 1, 2, 3], shard, 3) for shard in range(3)]  # type: ignore[list-item]
+    [[0, 3], [1], [2]]
+    """
+    if shard >= shards:
+        raise ConfigError(
+            f"shard={shard}: the first of {counted(shards, 'part')} is 0 and the last {shards - 1}; all of them are "
+            f"made by csm prepare -m shards={shards} 'shard=range({shards})'"
+        )
+    return jobs[shard::shards]
 
 
 def fill_store(data: DataModule, jobs: list[Job], workers: int | None) -> Summary:

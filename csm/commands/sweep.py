@@ -39,6 +39,7 @@ def _job_number(path: Path) -> tuple[int, str]:
 
 def _row(path: Path) -> dict[str, Any]:
     record = json.loads(path.read_text())
+    record.pop("settings", None)
     split = [item.lstrip("+~").split("=", 1) for item in record.pop("overrides", ()) if "=" in item]
     given = {key: value.strip("'") for key, value in split}
     return {"job": path.parent.name, **given, **record}

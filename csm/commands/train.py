@@ -12,6 +12,7 @@ from typing import Any
 
 from hydra import compose
 from hydra.core.hydra_config import HydraConfig
+from hydra.types import RunMode
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
@@ -19,9 +20,11 @@ from csm._counts import counted
 from csm.commands.app import command, output_folder
 from csm.commands.groups import make_data, make_protocol, matching_of, plain, register
 from csm.commands.outputs import require_results
+from csm.commands.processes import is_first, processes_to_start, train_together
 from csm.data.inspection import require_sound
 from csm.errors import ConfigError
 from csm.evaluation.tables import markdown_table
+from csm.experiments.ranks import NAME, part
 from csm.experiments.report import write_results
 from csm.experiments.testing import Tested, measure_all, numbers
 from csm.experiments.training import Training, fit
@@ -34,18 +37,24 @@ GROUPS = ("seed", "data", "descriptor", "model", "optimizer", "learning", "train
 """What TensorBoard compares runs by."""
 
 
-def run(cfg: DictConfig) -> dict[str, Any]:
-    """Train and, unless ``test=false``, test; return the numbers of the job."""
+def run(cfg: DictConfig) -> dict[str, Any] | None:
+    """Train and, unless ``test=false``, test; return the numbers of the job, or None in a process that only helps."""
     folder = output_folder()
     require_network_of_recipe(cfg, HydraConfig.get().overrides.task)
     training, protocol, matching = make_training(cfg), make_protocol(cfg), matching_of(cfg)
     require_device(cfg.device)
     require_results(cfg.results)
     require_sound(training.data, test=cfg.test, exact=protocol.distance == "exact" and not protocol.fallback)
-    print(
-        f"{training.name}: {training.data.protocol}; {counted(len(training.data.split.test), 'test shape')}", flush=True
-    )
+    if processes := processes_to_start(training, folder):
+        return train_together(processes, folder)
+    if is_first() or cfg.trainer.get("strategy") != NAME:
+        tests = counted(len(training.data.split.test), "test shape")
+        print(f"{training.name}: {training.data.protocol}; {tests}", flush=True)
     trained = fit(training, folder, cfg.resume)
+    if HydraConfig.get().mode == RunMode.RUN:  # the jobs of a sweep that torchrun started go on together
+        part()
+    if trained.rank:
+        return None
     print(f"trained for {trained.seconds / 60:.1f} minutes: {trained.checkpoint}")
     found = {"seconds": trained.seconds, "checkpoint": str(trained.checkpoint), **trained.measured}
     if not cfg.test:
@@ -114,4 +123,4 @@ def conclude(cfg: DictConfig, tested: list[Tested], notes: str) -> None:
     print(f"table:        {folder / 'rows.json'}, rows.csv\nreport:       {page}")
 
 
-main = command("train", folder=True)(run)
+main = command("train", folder=True, kept=("model.ckpt", "export/model.json"))(run)

@@ -47,10 +47,15 @@ def provenance(argv: Sequence[str] | None = None) -> Provenance:
     >>> provenance(["/usr/bin/csm", "train", "experiment=demo", "name=two words"]).command
     "csm train experiment=demo 'name=two words'"
     """
-    words = list((_typed or sys.argv) if argv is None else argv)
+    words = remembered_command() if argv is None else list(argv)
     program, *arguments = words or ["python"]
     command = " ".join([_program(program), *map(shlex.quote, arguments)])
     return Provenance(command, _commit() or f"csm {csm.__version__}", _versions())
+
+
+def remembered_command() -> list[str]:
+    """Return the command line of this process as it was typed."""
+    return list(_typed or sys.argv)
 
 
 def remember_command(argv: Sequence[str]) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
+from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
@@ -16,6 +18,7 @@ from csm.errors import NumericalError
 from csm.evaluation.engine import evaluate
 from csm.evaluation.protocol import EvaluationProtocol
 from csm.evaluation.results import Evaluation
+from csm.experiments.ranks import gathered
 from csm.learning.loading import LightningData
 from csm.matching.methods import PrecomputedMethod
 
@@ -54,32 +57,82 @@ class ValidationErrors(L.Callback):
         loaded = trainer.datamodule  # type: ignore[attr-defined]
         if trainer.sanity_checking or not isinstance(loaded, LightningData):
             return
-        found, self._descriptors = self._descriptors, {}
+        mine, self._descriptors = self._descriptors, {}
+        parts = gathered(trainer, mine)
+        if parts is not None:
+            self.latest = self._measured(loaded, {name: x for each in parts for name, x in each.items()})
+        summary = trainer.strategy.broadcast(None if self.latest is None else dict(self.latest.summary))
+        if summary is not None:
+            for name in ("age", "exact"):
+                pl_module.log(f"val/{name}", summary[name], prog_bar=True, sync_dist=True)
+
+    def _measured(self, loaded: LightningData, found: dict[str, Tensor]) -> Evaluation | None:
         if len(found) < 2:
-            return
+            return None
         shapes = InMemory([shape for shape in loaded.data.validation_shapes() if shape.name in found], "validation")
         method = PrecomputedMethod(found, "validation")
-        (self.latest,) = evaluate(method, shapes, self.protocol, store=loaded.data.store, workers=1, progress=False)
-        pl_module.log("val/age", self.latest.summary["age"], prog_bar=True)
-        pl_module.log("val/exact", self.latest.summary["exact"], prog_bar=True)
+        return evaluate(method, shapes, self.protocol, store=loaded.data.store, workers=1, progress=False)[0]
 
 
 class FiniteLoss(L.Callback):
-    """End the training at the step where the loss is no number any more."""
+    """End the training when the loss is no number any more, with the step where that began.
+
+    No step waits for it: on a graphics card, which computes while the next steps are being put in its queue, a loss is
+    looked at once it has been computed, a few steps later; at the end of an epoch all are.
+    """
+
+    def __init__(self) -> None:
+        self.pending: deque[_Step] = deque()
 
     def on_train_batch_end(
         self, trainer: L.Trainer, pl_module: L.LightningModule, outputs: Any, batch: Any, batch_idx: int
     ) -> None:
-        """Look at the loss; NumericalError with epoch and shape if it is not finite."""
+        """Look at the losses that are there; NumericalError with epoch and shape if one is not finite."""
         loss = outputs["loss"] if isinstance(outputs, Mapping) else outputs
-        if loss is None or bool(torch.isfinite(loss).all()):
+        if loss is None:
             return
         rate = trainer.optimizers[0].param_groups[0]["lr"]
-        raise NumericalError(
-            f"the training has diverged: the loss is {float(loss):g} in epoch {trainer.current_epoch + 1}, step "
-            f"{batch_idx + 1} (shape {batch.name}), at a learning rate of {rate:.3g}; take a smaller optimizer.lr, or "
-            "trainer.gradient_clip_val=1"
-        )
+        where = f"in epoch {trainer.current_epoch + 1}, step {batch_idx + 1} (shape {batch.name})"
+        self.pending.append(_Step(loss.detach(), f"{where}, at a learning rate of {rate:.3g}"))
+        while self.pending and self.pending[0].is_there():
+            self._look(self.pending.popleft())
+
+    def on_train_epoch_end(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
+        """Look at the losses that are left."""
+        while self.pending:
+            self._look(self.pending.popleft())
+
+    def _look(self, step: _Step) -> None:
+        value = step.value()
+        if not math.isfinite(value):
+            raise NumericalError(
+                f"the training has diverged: the loss is {value:g} {step.where}; take a smaller optimizer.lr, or "
+                "trainer.gradient_clip_val=1"
+            )
+
+
+class _Step:
+    """The loss of a step, on its way to the host."""
+
+    def __init__(self, loss: Tensor, where: str) -> None:
+        self.where = where
+        self._copied: torch.cuda.Event | None = None
+        self._loss = loss
+        if loss.is_cuda:
+            self._loss = torch.empty((), dtype=loss.dtype, pin_memory=True).copy_(loss, non_blocking=True)
+            self._copied = torch.cuda.current_stream(loss.device).record_event()
+
+    def is_there(self) -> bool:
+        """Tell whether the loss can be read without waiting."""
+        if self._copied is not None:
+            return bool(self._copied.query())  # type: ignore[no-untyped-call]
+        return self._loss.device.type == "cpu"
+
+    def value(self) -> float:
+        """Return the loss, waiting for it if need be."""
+        if self._copied is not None:
+            self._copied.synchronize()
+        return float(self._loss)
 
 
 class EpochLines(L.Callback):
@@ -102,7 +155,7 @@ class EpochLines(L.Callback):
 
     def on_train_epoch_end(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
         """Print the line."""
-        if sys.stdout.isatty():
+        if sys.stdout.isatty() or not trainer.is_global_zero:
             return
         shown = {
             name: float(value)

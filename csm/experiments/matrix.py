@@ -3,7 +3,8 @@
 The folder holds, per row and seed, ``model.ckpt``, how it was trained (``row.json``) and per test set and matcher one
 json and a page with its worst pairs.  Cells that exist are not computed again, so a matrix that was ended is started
 again with the same command; a training goes on from its last epoch, a test from its last target.  Matrices with a
-folder in common share the rows that have the same name.
+folder in common share the rows that have the same name, and may run at once: each row and seed has a lock, so that
+several jobs fill a matrix side by side, every one the rows that it is given (``only=`` and ``seeds=``).
 """
 
 from __future__ import annotations
@@ -103,7 +104,7 @@ class Matrix:
             return self._fill(rows)
         self.folder.mkdir(parents=True, exist_ok=True)
         kept = f"finished cells are kept in {self.folder}; the same command goes on with the others"
-        with locked(self.folder, wait=0), saying(lambda: kept):
+        with saying(lambda: kept):
             return self._fill(rows)
 
     def _fill(self, rows: Iterable[Row]) -> list[ResultRow]:
@@ -137,7 +138,11 @@ class Matrix:
         return self._place(row) / "model.ckpt"
 
     def _fill_row(self, row: Row) -> list[ResultRow]:
-        """Return the rows of every test set, one matcher after the other."""
+        """Return the rows of every test set, one matcher after the other, while no other run works on them."""
+        with locked(self._place(row) / ROW, wait=0):
+            return self._fill_locked(row)
+
+    def _fill_locked(self, row: Row) -> list[ResultRow]:
         known = require_same_training(self._place(row), row.identity)
         training = row.make()
         if not known:

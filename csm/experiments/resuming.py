@@ -12,6 +12,7 @@ import lightning as L
 import numpy as np
 import torch
 from lightning.fabric.plugins import TorchCheckpointIO
+from torch import distributed
 
 from csm.errors import ConfigError, DataError
 from csm.learning.checkpoint import read_checkpoint
@@ -24,6 +25,7 @@ AUTO = "auto"
 """Go on from the last checkpoint in the folder if there is one, else begin."""
 
 _FREE = ("in_channels", "training.epochs", "training.command", "training.commit", "training.name")  # what may differ
+_PER_STEP = "training.shapes_per_step"  # checkpoints that do not say it have 1
 _FIXED_LENGTH = ("cosine", "step", "drop", "one_cycle")  # schedules that are laid out over all epochs
 
 
@@ -45,11 +47,20 @@ class RandomStates(L.Callback):
     """Keep the states of all random generators in the checkpoint, and set them again when a training goes on.
 
     The order of the shapes, the vertices drawn for the loss and dropout are then those of the training that was not
-    stopped.
+    stopped.  Where several processes train together, each has states of its own; on another number of devices, rank 0
+    goes on with its own and the others draw anew.
     """
 
     def state_dict(self) -> dict[str, Any]:
-        """Return the states of PyTorch, CUDA, NumPy and Python as tensors and plain data."""
+        """Return the states of PyTorch, CUDA, NumPy and Python as tensors and plain data, those of all ranks."""
+        mine = self._mine()
+        if not distributed.is_initialized() or distributed.get_world_size() == 1:
+            return mine
+        every: list[Any] = [None] * distributed.get_world_size()
+        distributed.all_gather_object(every, mine)
+        return {**mine, "ranks": every}
+
+    def _mine(self) -> dict[str, Any]:
         kind, keys, position, has_gauss, cached = np.random.get_state()  # noqa: NPY002 - libraries use this generator
         version, internal, gauss = random.getstate()
         return {
@@ -60,7 +71,17 @@ class RandomStates(L.Callback):
         }
 
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
-        """Set all generators."""
+        """Set all generators of this rank."""
+        ranks = distributed.get_world_size() if distributed.is_initialized() else 1
+        rank = distributed.get_rank() if distributed.is_initialized() else 0
+        kept = state_dict.get("ranks", [state_dict])
+        if len(kept) == ranks:
+            self._set(kept[rank])
+        elif rank == 0:
+            _log.warning("going on with %d processes after %d: random draws differ from then on", ranks, len(kept))
+            self._set(kept[0])
+
+    def _set(self, state_dict: Mapping[str, Any]) -> None:
         torch.set_rng_state(state_dict["torch"].cpu())
         if torch.cuda.is_available() and len(state_dict["cuda"]) == torch.cuda.device_count():
             torch.cuda.set_rng_state_all([state.cpu() for state in state_dict["cuda"]])
@@ -122,6 +143,8 @@ def require_same_settings(path: Path, module: CSMModule, epochs: int | None = No
     kept, wanted = (_flat(read) for read in (read_checkpoint(path)["hyper_parameters"], module.hparams))
     differing = sorted(key for key in kept.keys() | wanted.keys() if kept.get(key) != wanted.get(key))
     changed = [key for key in differing if key not in _FREE]
+    if wanted.get(_PER_STEP) in (None, kept.get(_PER_STEP, 1)):
+        changed = [key for key in changed if key != _PER_STEP]
     if epochs is not None and module.schedule in _FIXED_LENGTH and kept.get("training.epochs") not in (None, epochs):
         changed.append("training.epochs")
     if changed:

@@ -100,6 +100,8 @@ def flatten(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def _logger(trainer: L.Trainer) -> TensorBoardLogger | None:
+    if not trainer.is_global_zero:
+        return None
     return next((logger for logger in trainer.loggers if isinstance(logger, TensorBoardLogger)), None)
 
 

@@ -10,7 +10,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,12 @@ from csm.descriptors.base import record
 from csm.errors import ConfigError
 from csm.evaluation.provenance import provenance
 from csm.experiments.callbacks import EpochLines, FiniteLoss, ValidationErrors
+from csm.experiments.ranks import (
+    SharedStatistics,
+    prepare_once,
+    require_one_or_ranks,
+    require_same_begin,
+)
 from csm.experiments.resuming import (
     AUTO,
     RandomStates,
@@ -81,12 +87,13 @@ class Training:
 
 @dataclass(frozen=True, eq=False)
 class Trained:
-    """A trained network, its checkpoint, and what was measured on the way."""
+    """A trained network, its checkpoint, and what was measured on the way; `rank` is that of the process."""
 
     module: CSMModule
     checkpoint: Path
     seconds: float
     measured: Mapping[str, float]
+    rank: int = 0
 
 
 def default_callbacks(seed: int = 0) -> list[L.Callback]:
@@ -115,24 +122,26 @@ def fit(training: Training, folder: Path, resume: Path | str | None = AUTO) -> T
     NumericalError
         If the loss is not finite.
     """
-    _quiet_lightning()
     folder.mkdir(parents=True, exist_ok=True)
-    with locked(folder, wait=0):
-        return _fit(training, folder, resume)
-
-
-def _fit(training: Training, folder: Path, resume: Path | str | None) -> Trained:
     L.seed_everything(training.seed, workers=True, verbose=False)
+    trainer = make_trainer(training, folder)
+    with locked(folder, wait=0) if trainer.is_global_zero else nullcontext():
+        return _fit(training, trainer, folder, resume)
+
+
+def _fit(training: Training, trainer: L.Trainer, folder: Path, resume: Path | str | None) -> Trained:
     begin = resume_point(folder, resume)
-    trainer = _make_trainer(training, folder)
-    draft = sketch(training, trainer.max_epochs)
+    draft = sketch(training, trainer.max_epochs, shapes_per_step(trainer))
     if begin:
         require_same_settings(begin, draft, trainer.max_epochs)
     loaded = LightningData(training.data)
-    loaded.prepare_data()
-    module = make_module(training, loaded.n_features, trainer.max_epochs)
+    prepare_once(trainer, loaded)
+    require_same_begin(trainer, folder, begin)
+    module = make_module(training, loaded.n_features, trainer.max_epochs, shapes_per_step(trainer))
     if module.inputs is not None:
         module.inputs.learn(sample.features for sample in loaded.fitted())
+    if trainer.global_rank:
+        torch.manual_seed(training.seed + trainer.global_rank)  # weights and order are those of rank 0, dropout is not
     begun = time.perf_counter()
     with saying(lambda: _what_is_kept(folder, trainer)), _interruptible():
         trainer.fit(module, datamodule=loaded, ckpt_path=begin, weights_only=True)
@@ -140,16 +149,22 @@ def _fit(training: Training, folder: Path, resume: Path | str | None) -> Trained
     module.hparams["training"]["epochs"] = trainer.current_epoch  # fewer than asked for where max_time ended it
     checkpoint = folder / "model.ckpt"
     trainer.save_checkpoint(checkpoint)
-    export_module(module, folder / "export")
+    if trainer.is_global_zero:
+        export_module(module, folder / "export")
     measured = {key: float(value) for key, value in trainer.callback_metrics.items()}
-    return Trained(module, checkpoint, seconds, measured)
+    return Trained(module, checkpoint, seconds, measured, trainer.global_rank)
 
 
-def sketch(training: Training, epochs: int | None) -> CSMModule:
+def shapes_per_step(trainer: L.Trainer) -> int:
+    """Return over how many shapes the gradient of one step is taken."""
+    return int(trainer.accumulate_grad_batches) * trainer.world_size
+
+
+def sketch(training: Training, epochs: int | None, per_step: int | None = None) -> CSMModule:
     """Make the module without memory for its weights: what does not fit fails here, before the preparation."""
     try:
         with torch.device("meta"):
-            return make_module(training, 1, epochs)
+            return make_module(training, 1, epochs, per_step)
     except (IndexError, RuntimeError, TypeError, ZeroDivisionError) as error:
         options = ", ".join(f"{key}={value}" for key, value in training.network.items())
         raise ConfigError(f"model: no network can be made with {options} ({error})") from error
@@ -180,8 +195,13 @@ def _interruptible() -> Iterator[None]:
             signal.signal(signal.SIGINT, handler)
 
 
-def make_module(training: Training, n_features: int, epochs: int | None = None) -> CSMModule:
-    """Make the untrained module of a training for input features of this width."""
+def make_module(
+    training: Training, n_features: int, epochs: int | None = None, per_step: int | None = None
+) -> CSMModule:
+    """Make the untrained module of a training for input features of this width.
+
+    Its hyper-parameters tell the number of `epochs`, and over how many shapes the gradient of one step is taken.
+    """
     data, made = training.data, provenance()
     return CSMModule(
         network=dict(training.network),
@@ -198,14 +218,19 @@ def make_module(training: Training, n_features: int, epochs: int | None = None) 
             "protocol": data.protocol,
             "seed": training.seed,
             "epochs": epochs,
+            **({} if per_step is None else {"shapes_per_step": per_step}),
             "command": made.command,
             "commit": made.commit,
         },
     )
 
 
-def _make_trainer(training: Training, folder: Path) -> L.Trainer:
-    """Make the trainer; Lightning's bar needs a terminal, elsewhere `EpochLines` takes its place."""
+def make_trainer(training: Training, folder: Path) -> L.Trainer:
+    """Make the trainer of a training in a folder; ConfigError if its settings do not fit each other or this machine.
+
+    Lightning's bar needs a terminal, elsewhere `EpochLines` takes its place.
+    """
+    _quiet_lightning()
     last = last_checkpoint(folder)
     keep = ModelCheckpoint(last.parent, filename=last.stem, enable_version_counter=False, save_on_train_epoch_end=True)
     for callback in training.callbacks:
@@ -215,17 +240,14 @@ def _make_trainer(training: Training, folder: Path) -> L.Trainer:
         trainer = _trainer(training, folder, keep)
     except (ValueError, TypeError, MisconfigurationException) as error:
         raise ConfigError(f"trainer: {' '.join(str(error).split())}") from error
-    if trainer.num_devices != 1 or trainer.num_nodes != 1:
-        raise ConfigError(
-            f"trainer.devices={trainer.num_devices}: csm trains on one device, as a batch is one shape; set "
-            "trainer.devices=1"
-        )
+    require_one_or_ranks(trainer)
     return trainer
 
 
 def _trainer(training: Training, folder: Path, keep: ModelCheckpoint) -> L.Trainer:
     return training.trainer(
-        callbacks=[*training.callbacks, RandomStates(), FiniteLoss(), keep],
+        callbacks=[SharedStatistics(), *training.callbacks, RandomStates(), FiniteLoss(), keep],
+        use_distributed_sampler=False,  # the data share themselves out
         plugins=[WholeCheckpoints()],
         logger=_make_logger(training, folder),
         default_root_dir=folder,

@@ -1,13 +1,18 @@
-"""The data modules of csm as Lightning's trainer takes them: one shape per batch."""
+"""The data modules of csm as Lightning's trainer takes them: one shape per batch.
+
+Where several processes train one network together, each has its own share of the shapes: of every epoch, which all of
+them go through in one order, rank r of W takes the shapes r, r + W, r + 2 W, ...  A step of W processes therefore sees
+the shapes that one process sees in W batches, as with ``accumulate_grad_batches=W``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from typing import overload
+from typing import Any, NamedTuple, overload
 
 import lightning as L
-from torch.utils.data import DataLoader
+from torch.utils.data import DataLoader, RandomSampler, Sampler
 
 from csm.data.additional import Additional
 from csm.data.base import DataModule
@@ -41,6 +46,49 @@ class Samples(Sequence[ShapeSample]):
         return Samples(self._make[key]) if isinstance(key, slice) else self._make[key]()
 
 
+class Share(NamedTuple):
+    """Which of the processes that train together this one is: `rank` of `ranks`."""
+
+    rank: int = 0
+    ranks: int = 1
+
+    def of(self, items: Sequence[int]) -> list[int]:
+        """Return every `ranks`-th item from number `rank` on; the first items follow the last, so that all get as many.
+
+        Examples
+        --------
+        >>> Share(0, 2).of([5, 6, 7]), Share(1, 2).of([5, 6, 7])
+        ([5, 7], [6, 5])
+        """
+        each = -(-len(items) // self.ranks)
+        return [items[(self.rank + i * self.ranks) % len(items)] for i in range(each)] if items else []
+
+
+class SharedOrder(Sampler[int]):
+    """The share of one process in an epoch, in an order that is drawn anew for every epoch.
+
+    Parameters
+    ----------
+    n
+        Number of shapes.
+    share
+        Of this process.
+    agree
+        Takes an order and returns that of rank zero, the same in all processes.
+    """
+
+    def __init__(self, n: int, share: Share, agree: Callable[[list[int]], list[int]]) -> None:
+        self.n, self.share, self.agree = n, share, agree
+
+    def __iter__(self) -> Iterator[int]:
+        """Draw an order as a single process does, and go through the share of this one."""
+        yield from self.share.of(self.agree(list(RandomSampler(range(self.n)))))
+
+    def __len__(self) -> int:
+        """Return the number of shapes per epoch and process."""
+        return len(self.share.of(range(self.n)))
+
+
 class LightningData(L.LightningDataModule):
     """Loaders of the training and validation shapes of a data module.
 
@@ -56,13 +104,13 @@ class LightningData(L.LightningDataModule):
         self._samples: dict[str, ShapeSample] = {}
         self._kept: dict[tuple[str, str], ShapeSample] = {}
         self._room = ROOM
-        self._is_prepared = False
+        self.is_prepared = False
 
     def prepare_data(self) -> None:
         """Fill the store for the training shapes, once; Lightning calls this on one process only."""
-        if not self._is_prepared:
+        if not self.is_prepared:
             self.data.prepare()
-            self._is_prepared = True
+            self.is_prepared = True
 
     def sample(self, name: str) -> ShapeSample:
         """Return the tensors of a training shape; they are made once and stay in memory."""
@@ -92,13 +140,28 @@ class LightningData(L.LightningDataModule):
             self._kept[key] = sample
         return sample
 
+    @property
+    def share(self) -> Share:
+        """Which of the processes that train together this one is."""
+        return Share() if self.trainer is None else Share(self.trainer.global_rank, self.trainer.world_size)
+
     def train_dataloader(self) -> DataLoader[ShapeSample]:
-        """Return the fitted shapes in random order."""
-        return self._loader(self.fitted(), shuffle=True)
+        """Return the fitted shapes in random order, or the share of this process in them."""
+        samples = self.fitted()
+        if self.trainer is None or self.share.ranks == 1:
+            return self._loader(samples, shuffle=True)
+        return self._loader(samples, sampler=SharedOrder(len(samples), self.share, self.trainer.strategy.broadcast))
 
     def val_dataloader(self) -> DataLoader[ShapeSample]:
-        """Return the validation shapes in order."""
-        return self._loader([self.sample(name) for name in self.data.validation_names], shuffle=False)
+        """Return the validation shapes in order, or the share of this process in them.
 
-    def _loader(self, samples: Sequence[ShapeSample], shuffle: bool) -> DataLoader[ShapeSample]:
-        return DataLoader(samples, batch_size=None, shuffle=shuffle)  # type: ignore[arg-type]
+        What is there again, so that all processes have as many, does not count: all together count each shape once.
+        (Lightning rounds the mean of these weights over W processes to a whole number, so one shape has weight W.)
+        """
+        names, (rank, ranks) = self.data.validation_names, self.share
+        mine = enumerate(self.share.of(range(len(names))))
+        weights = ((names[j], ranks if rank + i * ranks < len(names) else 0) for i, j in mine)
+        return self._loader([self.sample(name)._replace(counts=weight) for name, weight in weights])
+
+    def _loader(self, samples: Sequence[ShapeSample], **how: Any) -> DataLoader[ShapeSample]:
+        return DataLoader(samples, batch_size=None, **how)  # type: ignore[arg-type]

@@ -144,15 +144,16 @@ class CSMModule(L.LightningModule):
         """One shape: loss of its labelled vertices."""
         features = sample.features
         if self.rotate:
-            features = features @ random_rotation().to(features)
+            features = features @ random_rotation().to(features, non_blocking=True)
         loss = self.loss(self(features, sample.surface), sample)
-        self.log("train/loss", loss, on_step=False, on_epoch=True, prog_bar=True, batch_size=1)
+        self.log("train/loss", loss, on_step=False, on_epoch=True, prog_bar=True, batch_size=1, sync_dist=True)
         return loss
 
     def validation_step(self, sample: ShapeSample) -> Tensor:
         """Return the learned descriptor of one shape; the loss is logged, the errors are a callback's business."""
         descriptor: Tensor = self(sample.features, sample.surface)
-        self.log("val/loss", self.loss(descriptor, sample), prog_bar=True, batch_size=1)
+        loss = self.loss(descriptor, sample)
+        self.log("val/loss", loss, prog_bar=True, batch_size=sample.counts, sync_dist=True)
         return descriptor
 
     @torch.no_grad()

@@ -15,6 +15,7 @@ from csm.descriptors.presets import from_parameters
 from csm.errors import ConfigError
 from csm.mesh.correspondence import PointMap
 from csm.networks import Basis, Surface, stencils_of
+from csm.networks.surface import with_cuts
 from csm.operators.stencils import Stencil, stencil
 
 
@@ -33,7 +34,8 @@ class ShapeSample(NamedTuple):
     """One training shape.
 
     Shapes: `features` (N, P); `surface` with K eigenpairs; `rows` (R,) vertices with a known template point and
-    `classes` (R,) that point of the `template`, which has no name if it is that of the training set.
+    `classes` (R,) that point of the `template`, which has no name if it is that of the training set.  `counts` is its
+    weight in the loss of a validation.
     """
 
     name: str
@@ -42,6 +44,7 @@ class ShapeSample(NamedTuple):
     rows: Tensor
     classes: Tensor
     template: str = ""
+    counts: int = 1
 
 
 def network_input(prepared: Prepared) -> NetworkInput:
@@ -50,7 +53,7 @@ def network_input(prepared: Prepared) -> NetworkInput:
     none = np.zeros(0), np.zeros((len(prepared.mass), 0))
     evals, evecs = none if spectrum is None else (spectrum.evals, spectrum.evecs)
     basis = Basis(*(torch.as_tensor(a, dtype=torch.float32) for a in (evals, evecs, prepared.mass)))
-    stencils = {name: _tensors(arrays) for name, arrays in prepared.stencils.items()}
+    stencils = with_cuts({name: _tensors(arrays) for name, arrays in prepared.stencils.items()})
     return NetworkInput(torch.as_tensor(prepared.features), Surface(basis, stencils))
 
 

@@ -11,6 +11,7 @@ from torch import Tensor, nn
 
 from csm.networks.base import ConvolutionalNetwork
 from csm.networks.csmconv import BiasDomain, CSMConv
+from csm.networks.sparse import widened
 from csm.networks.surface import Surface
 
 Normalisation = Literal["batch", "instance", "area", "none"]
@@ -148,6 +149,7 @@ class VertexNorm(nn.Module):
 
     def forward(self, x: Tensor, areas: Tensor) -> Tensor:
         """Return the functions `x`, shape (N, C), normalised over the N vertices, which have these areas."""
+        x = widened(x)
         share = (areas if self.by_area else torch.ones_like(areas)).to(x.dtype)
         share = share / share.sum()
         centred = x - share @ x

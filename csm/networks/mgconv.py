@@ -11,6 +11,8 @@ import torch
 from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 
+from csm.networks.sparse import widened, without_autocast
+
 Products = Literal["float32", "bfloat16"]
 
 HELD_BYTES = 3e9
@@ -49,12 +51,14 @@ class WaveletOperators:
 
     def __init__(self, stencil: Mapping[str, Tensor], dtype: torch.dtype, products: Products = "float32") -> None:
         self._evecs, self._responses = stencil["evecs"].to(dtype), stencil["responses"].to(dtype)
-        self._used = [int(response.count_nonzero()) for response in self._responses.T]  # the rest are zeros
+        used = stencil["used"] if "used" in stencil else self._responses.count_nonzero(0)
+        self._used: list[int] = used.tolist()  # the rest are zeros
         self._rows, self._columns = _split(stencil, "row"), _split(stencil, "column")
         self._dropped = torch.split(stencil["dropped"].to(dtype), [len(rows) for rows in self._rows])
         self._extents: list[list[int]] = stencil["extents"].tolist()
         self.dtype = torch.bfloat16 if products == "bfloat16" else dtype
-        self._held = list(self._make()) if self.n_bytes <= HELD_BYTES else None
+        with without_autocast(self._evecs):
+            self._held = list(self._make()) if self.n_bytes <= HELD_BYTES else None
 
     @property
     def n_wavelets(self) -> int:
@@ -90,7 +94,8 @@ class WaveletOperators:
 
         The weight that the stencil dropped is given to the mean over all vertices.
         """
-        y: Tensor = _Averages.apply(x, self)  # type: ignore[no-untyped-call]
+        with without_autocast(x):
+            y: Tensor = _Averages.apply(widened(x), self)  # type: ignore[no-untyped-call]
         return y
 
 

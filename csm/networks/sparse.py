@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any, NamedTuple
 
 import torch
@@ -35,12 +36,24 @@ class Csr(NamedTuple):
         )
 
 
+def widened(x: Tensor) -> Tensor:
+    """Return functions of half the precision, which autocast makes, as float32, and others as they are."""
+    return x.float() if x.dtype in (torch.bfloat16, torch.float16) else x
+
+
+def without_autocast(x: Tensor) -> AbstractContextManager[object]:
+    """Return a block in which products on the device of `x` keep the precision of their factors."""
+    known = torch.amp.is_autocast_available(x.device.type)
+    return torch.autocast(x.device.type, enabled=False) if known else nullcontext()
+
+
 def spmm(matrix: Csr, x: Tensor, transposed: Csr) -> Tensor:
     """Multiply a sparse matrix, shape (N, M), with `x`, shape (M, C); the gradient goes to `x` alone.
 
     `transposed` is the same matrix with rows and columns exchanged, shape (M, N); the backward pass multiplies with it.
     """
-    y: Tensor = _Product.apply(x, matrix, transposed)  # type: ignore[no-untyped-call]
+    with without_autocast(x):
+        y: Tensor = _Product.apply(widened(x), matrix, transposed)  # type: ignore[no-untyped-call]
     return y
 
 
@@ -77,7 +90,8 @@ def chebyshev_filter(x: Tensor, weight: Tensor, matrices: Sequence[Tensor]) -> T
     Tensor
         Shape (N, C_out).
     """
-    y: Tensor = _ChebyshevFilter.apply(x, weight, matrices)  # type: ignore[no-untyped-call]
+    with without_autocast(x):
+        y: Tensor = _ChebyshevFilter.apply(widened(x), weight, matrices)  # type: ignore[no-untyped-call]
     return y
 
 

@@ -12,7 +12,7 @@ from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 
 from csm.networks.base import ConvolutionalNetwork
-from csm.networks.sparse import Csr
+from csm.networks.sparse import Csr, widened, without_autocast
 from csm.networks.surface import Surface
 
 Aggregate = Literal["sum", "mean"]
@@ -147,7 +147,8 @@ def spline_messages(x: Tensor, weight: Tensor, stencil: Mapping[str, Tensor]) ->
     stencil
         The tensors of `csm.operators.stencils.edge_splines.EdgeSplines` with a kernel of s.
     """
-    y: Tensor = _SplineMessages.apply(x, weight, stencil)  # type: ignore[no-untyped-call]
+    with without_autocast(x):
+        y: Tensor = _SplineMessages.apply(widened(x), weight, stencil)  # type: ignore[no-untyped-call]
     return y
 
 
@@ -162,7 +163,8 @@ class _Gathered(NamedTuple):
 def _gathered(x: Tensor, stencil: Mapping[str, Tensor]) -> Iterator[_Gathered]:
     """Yield the rows of S_m x that are not empty, for one control point m after the other."""
     offsets = stencil["offsets"]
-    bounds, starts = offsets.tolist(), stencil["indptr"][offsets].tolist()
+    starts: list[int] = (stencil["starts"] if "starts" in stencil else stencil["indptr"][offsets]).tolist()
+    bounds: list[int] = offsets.tolist()
     for point, ((begin, end), (first, last)) in enumerate(
         zip(itertools.pairwise(bounds), itertools.pairwise(starts), strict=True)
     ):

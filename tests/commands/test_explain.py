@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import errno
+import importlib.util
 import os
 
 import pytest
@@ -14,6 +15,9 @@ from csm.errors import ConfigError, MeshError
 
 register("data", "descriptor", "model")
 
+LAUNCHERS = {"joblib": "joblib", "ray": "ray", "submitit_local": "submitit", "submitit_slurm": "submitit"}
+MISSING = [name for name, library in LAUNCHERS.items() if importlib.util.find_spec(library) is None]
+
 
 @pytest.mark.parametrize(
     ("override", "said"),
@@ -24,7 +28,8 @@ register("data", "descriptor", "model")
         ("descriptor=adc", "descriptor=adc: there is no such option; did you mean"),
         ("experiment=human", "did you mean humans"),
         ("descriptor=null", "a group takes the name of one of its options"),
-        ("hydra/launcher=joblib", "pip install 'csm[sweep]'"),
+        *((f"hydra/launcher={name}", "pip install 'csm[sweep]'") for name in MISSING),
+        *[("hydra/launcher=ray_cluster", "hydra/launcher=ray needs an extra")] * ("ray" in MISSING),
         ("hydra/sweeper=optuna", "pip install 'csm[sweep]'"),
         ("~foo", "~foo: there is no such key to leave out"),
         ("seed==1", "'seed==1' is not of the form key=value"),
@@ -69,6 +74,15 @@ def test_missing_extras_and_memory_are_named():
     assert "csm[viz]" in str(explained(ModuleNotFoundError("No module", name="polyscope"), "match"))
     assert "not enough memory" in str(explained(MemoryError("8 GiB"), "match"))
     assert "no graphics card" in str(explained(RuntimeError("Found no NVIDIA driver on your system"), "match"))
+
+
+def test_errors_of_launchers_say_what_to_do():
+    slurm = RuntimeError('Could not detect "srun", are you indeed on a slurm cluster?')
+    assert "submitit_local, joblib or ray" in str(explained(slurm, "train"))
+    killed = type("TerminatedWorkerError", (Exception,), {})()
+    assert "the same folder (hydra.sweep.dir) goes on" in str(explained(killed, "train"))
+    parted = RuntimeError("[gloo/transport/tcp/pair.cc:534] Connection closed by peer [127.0.0.1]:5")
+    assert "another process that trains together with this one has ended" in str(explained(parted, "train"))
 
 
 @pytest.mark.parametrize("error", [KeyError("x"), ValueError("odd"), ZeroDivisionError(), ModuleNotFoundError("x")])

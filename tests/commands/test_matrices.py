@@ -57,6 +57,25 @@ def test_an_experiment_does_not_change_the_network_of_a_recipe_in_silence():
             rows_of(OmegaConf.merge(cfg, {"only": ["bad"]}))
 
 
+@pytest.mark.parametrize("how", ["trainer.devices=2", "trainer=ddp"])
+def test_a_row_of_several_devices_is_refused(how):
+    with (
+        initialize_config_dir(str(config_folder()), version_base="1.3"),
+        pytest.raises(ConfigError, match="each row of a matrix is trained on one device, and several rows at once"),
+    ):
+        rows_of(compose("matrix", [f'+rows={{a: ["experiment=humans_rival", "recipe=mlp", "{how}"]}}']))
+
+
+def test_how_a_row_takes_steps_is_part_of_what_it_is():
+    def identity(*words: str) -> dict[str, object]:
+        rows = ", ".join(f'"{word}"' for word in ("experiment=humans_rival", "recipe=mlp", *words))
+        return dict(rows_of(compose("matrix", [f"+rows={{a: [{rows}]}}"]))[0].identity)
+
+    with initialize_config_dir(str(config_folder()), version_base="1.3"):
+        assert identity() | {"trainer.accumulate_grad_batches": 4} == identity("trainer.accumulate_grad_batches=4")
+        assert identity() | {"trainer.precision": "bf16-mixed"} == identity("trainer.precision=bf16-mixed")
+
+
 def test_an_ablation_varies_one_option_at_a_time():
     with initialize_config_dir(str(config_folder()), version_base="1.3"):
         rows = rows_of(compose("matrix", ["experiment=ablation"]))

@@ -267,7 +267,7 @@ def test_prepare_fills_checks_and_prunes(bench, capsys):
     ("command", "arguments", "message"),
     [
         ("train", ["data=faust", "data.root=nowhere"], "wanted FAUST_6890"),
-        ("train", [*SMALL, "data.root=toys", "trainer.devices=2"], "one device"),
+        ("train", [*SMALL, "data.root=toys", "trainer.devices=2"], "several devices train together with trainer=ddp"),
         ("train", [*SMALL, "data.root=toys", "model.ks=999"], "data.basis_k=999"),
         ("train", [*SMALL, "data.root=toys", "model.activation=sine"], "relu"),
         ("train", [*SMALL, "data.root=toys", "descriptor.alpha=-1"], "alpha"),

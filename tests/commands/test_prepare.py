@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -11,7 +12,9 @@ import time
 import pytest
 from omegaconf import OmegaConf
 
-from csm.commands.prepare import all_jobs, check_store, fill_store, prune_store, run
+from csm.commands.prepare import all_jobs, check_store, fill_store, prune_store, run, shard_of
+from csm.data.additional import Additional
+from csm.data.shapes import InMemory
 from csm.data.store import Store
 from csm.errors import ConfigError, DataError
 from tests.shapes import sphere
@@ -31,6 +34,36 @@ def test_the_store_is_filled_checked_and_pruned(tmp_path, capsys):
     assert prune_store(data.store, None) == {"deleted": 1}
     assert str(broken) in capsys.readouterr().out
     assert check_store(data.store)["entries"] == 11
+
+
+@pytest.mark.parametrize("shards", [1, 2, 3, 5, 9])
+def test_the_parts_of_a_preparation_have_nothing_in_common_and_leave_nothing_out(tmp_path, shards):
+    data = toy_datamodule(tmp_path)
+    jobs = all_jobs(data)
+    parts = [shard_of(jobs, shard, shards) for shard in range(shards)]
+    assert sorted(job.label for part in parts for job in part) == sorted(job.label for job in jobs)
+    assert max(map(len, parts)) - min(map(len, parts)) <= 1
+    with pytest.raises(ConfigError, match=rf"shard={shards}: "):
+        shard_of(jobs, shards, shards)
+
+
+def test_parts_are_made_by_a_sweep_over_one_store_and_skipped_when_they_are_there(csm, tmp_path):
+    write_toys(tmp_path / "toys")
+    small = "data=folder data.root=toys data.n_test=2 data.basis_k=24 descriptor.angles=3 descriptor.k=8 model=mlp"
+    words = [*small.split(), "workers=0", "shards=4", "shard=range(4)", "store=s"]
+    status, said, _ = csm("prepare", "-m", *words)
+    assert status == 0
+    assert re.findall(r"(\d) made, (\d) already there", said) == [("2", "0"), ("2", "0"), ("1", "0"), ("1", "0")]
+    (lost := Store(tmp_path / "s").files()[0]).unlink()
+    _, said, _ = csm("prepare", "-m", *words)
+    assert sorted(re.findall(r"(\d) made", said)) == ["0", "0", "0", "1"]
+    assert lost.exists()
+
+
+def test_additional_shapes_are_prepared_too(tmp_path):
+    data = toy_datamodule(tmp_path)
+    data.also = (Additional(InMemory([data.test_sets["toys"].load("toy5")], "more"), ("toy5",)),)
+    assert "more/toy5" in [job.label for job in all_jobs(data)]
 
 
 def test_a_store_that_cannot_be_written_is_refused_before_the_work(tmp_path, monkeypatch):

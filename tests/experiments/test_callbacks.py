@@ -1,13 +1,15 @@
 from __future__ import annotations
 
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import torch
 
+from csm.errors import NumericalError
 from csm.evaluation import evaluate
-from csm.experiments.callbacks import EpochLines, ValidationErrors
+from csm.experiments.callbacks import EpochLines, FiniteLoss, ValidationErrors
 from csm.learning.loading import LightningData
 from csm.matching.network import NetworkMethod
 from tests.learning.toys import make, train
@@ -72,3 +74,31 @@ def test_validation_leaves_training_as_it_was(loaded, tmp_path):
         train(module, loaded, tmp_path, 2, callbacks=callbacks)
         weights.append(module.network.embed.weight.detach().clone())
     torch.testing.assert_close(*weights)
+
+
+class Late:
+    """A loss that is on its way from a device."""
+
+    def __init__(self, value: float, there: bool) -> None:
+        self.where, self.there, self._value = "in epoch 1, step 2 (shape toy0)", there, value
+
+    def is_there(self) -> bool:
+        return self.there
+
+    def value(self) -> float:
+        return self._value
+
+
+def test_a_loss_is_looked_at_when_it_is_there_and_at_the_end_in_any_case():
+    finite = FiniteLoss()
+    trainer = SimpleNamespace(optimizers=[SimpleNamespace(param_groups=[{"lr": 0.1}])], current_epoch=0)
+    finite.pending.extend([Late(1.0, True), Late(float("nan"), False)])
+    step = (trainer, None, {"loss": torch.tensor(1.0)}, SimpleNamespace(name="toy1"), 2)
+    finite.on_train_batch_end(*step)
+    assert [one.is_there() for one in finite.pending] == [False, True]
+    finite.pending[0].there = True
+    with pytest.raises(NumericalError, match=r"the loss is nan in epoch 1, step 2 \(shape toy0\)"):
+        finite.on_train_batch_end(*step)
+    finite.pending.appendleft(Late(float("inf"), False))
+    with pytest.raises(NumericalError, match="the loss is inf"):
+        finite.on_train_epoch_end(trainer, None)

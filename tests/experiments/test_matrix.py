@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from csm._locks import locked
 from csm.errors import ConfigError, DataError
 from csm.evaluation import EvaluationProtocol
 from csm.evaluation.report import ResultRow, read_rows
@@ -242,3 +243,16 @@ def test_without_its_settings_a_folder_is_judged_by_its_network(bench, content, 
         bench.fill([other])
     with pytest.raises(ConfigError, match="lr: 0"):
         bench.fill([other])
+
+
+def test_two_runs_fill_one_matrix_side_by_side_and_no_row_twice(bench):
+    one, two = bench.row("one"), bench.row("two")
+    bench.fill([two])
+    with (
+        locked(bench.place("one") / "row.json", wait=0),
+        pytest.raises(ConfigError, match=r"one, seed 0: .*row\.json: another run of csm has kept this file"),
+    ):
+        bench.fill([one, two], matching=("nearest", "argmax"))
+    assert (bench.trained, bench.tested) == ([], [("two", "toys", ("argmax",))])
+    assert {row.method for row in bench.fill([one, two])} == {"one", "two"}
+    assert bench.trained == [("one", 0, False)]

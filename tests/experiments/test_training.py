@@ -23,6 +23,7 @@ from csm.matching.network import NetworkMethod, load_model
 from tests.experiments.toys import a_training
 from tests.learning.toys import NETWORK, QUICK
 from tests.shapes import blob
+from tests.toyset import toy_datamodule
 
 
 def visible(folder):
@@ -117,7 +118,7 @@ def test_the_seed_decides_everything(tmp_path):
 
 def test_settings_that_do_not_fit_are_errors_of_the_user(tmp_path):
     two = partial(L.Trainer, **(QUICK | {"devices": 2}))
-    with pytest.raises(ConfigError, match=r"trainer\.devices=2: csm trains on one device"):
+    with pytest.raises(ConfigError, match=r"trainer\.devices=2, .*several devices train together with trainer=ddp"):
         fit(a_training(tmp_path, trainer=two), tmp_path / "run")
     with pytest.raises(ConfigError, match=r"data\.basis_k=64"):
         fit(a_training(tmp_path, network=NETWORK | {"ks": 64}), tmp_path / "run")
@@ -144,7 +145,7 @@ def test_the_default_callbacks_are_those_of_the_command(tmp_path):
 
 def test_panels_get_the_settings_of_the_training_unless_they_have_some(tmp_path):
     empty, own = TensorBoardPanels(), TensorBoardPanels({"mine": 1})
-    module._make_trainer(a_training(tmp_path, callbacks=[empty, own], settings={"seed": 3}), tmp_path)
+    module.make_trainer(a_training(tmp_path, callbacks=[empty, own], settings={"seed": 3}), tmp_path)
     assert (empty.hparams, own.hparams) == ({"seed": 3}, {"mine": 1})
 
 
@@ -152,7 +153,7 @@ def test_panels_get_the_settings_of_the_training_unless_they_have_some(tmp_path)
 def test_a_bar_is_for_terminals(tmp_path, monkeypatch, terminal, wanted, bar):
     monkeypatch.setattr(sys.stdout, "isatty", lambda: bool(terminal))
     trainer = partial(L.Trainer, **(QUICK | {"enable_progress_bar": bool(wanted)}))
-    made = module._make_trainer(a_training(tmp_path, trainer=trainer), tmp_path)
+    made = module.make_trainer(a_training(tmp_path, trainer=trainer), tmp_path)
     assert isinstance(made.progress_bar_callback, TQDMProgressBar) == bool(bar)
 
 
@@ -162,3 +163,39 @@ def test_a_module_is_made_for_the_shapes_of_the_data(tmp_path):
     assert made.network.classifier.weight.shape[0] == training.data.n_classes == 162
     assert made.hparams["training"]["epochs"] == 9
     assert np.isclose(made.lr, 1e-2)
+
+
+def test_a_step_over_two_shapes_is_counted_and_scheduled_once(tmp_path):
+    """Three shapes are two steps, the second over one; the rate of one cycle ends where the training does."""
+    how = {"max_epochs": 3, "accumulate_grad_batches": 2}
+    data, options = toy_datamodule(tmp_path, holdout=1), {"lr": 1e-2, "schedule": "one_cycle"}
+    training = a_training(tmp_path, data=data, options=options, trainer=partial(L.Trainer, **(QUICK | how)))
+    trained = fit(training, tmp_path / "run")
+    state = torch.load(trained.checkpoint, weights_only=True)
+    assert state["global_step"] == state["lr_schedulers"][0]["last_epoch"] == 3 * 2
+    assert state["lr_schedulers"][0]["total_steps"] == 3 * 2 + 1
+    assert trained.module.hparams["training"]["shapes_per_step"] == 2
+
+
+def test_the_loss_that_is_logged_is_that_of_a_shape_whatever_a_step_takes(tmp_path):
+    data = toy_datamodule(tmp_path)
+    logged = []
+    for many in (1, 4):
+        trainer = partial(L.Trainer, **(QUICK | {"max_epochs": 1, "accumulate_grad_batches": many}))
+        training = a_training(tmp_path, data=data, options={"lr": 0.0}, trainer=trainer)
+        logged.append(fit(training, tmp_path / str(many)).measured["train/loss"])
+    assert logged[0] == pytest.approx(logged[1])
+
+
+def test_a_training_of_several_shapes_per_step_goes_on_as_if_it_had_not_been_stopped(tmp_path):
+    data = toy_datamodule(tmp_path)
+
+    def of(epochs, many=2):
+        trainer = partial(L.Trainer, **(QUICK | {"max_epochs": epochs, "accumulate_grad_batches": many}))
+        return a_training(tmp_path, data=data, trainer=trainer, network=NETWORK | {"dropout": 0.3})
+
+    whole = fit(of(4), tmp_path / "whole").module.state_dict()
+    fit(of(2), tmp_path / "cut")
+    with pytest.raises(ConfigError, match=r"training\.shapes_per_step: 2 there, 1 wanted"):
+        fit(of(4, 1), tmp_path / "cut")
+    torch.testing.assert_close(fit(of(4), tmp_path / "cut").module.state_dict(), whole, rtol=0, atol=0)

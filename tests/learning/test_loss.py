@@ -50,6 +50,21 @@ def test_bfloat16_products_stay_within_the_documented_error():
         assert (a - b).norm() / b.norm() < 6e-3
 
 
+def test_autocast_rounds_the_products_and_neither_softmax_nor_gradients():
+    x, weight, bias, target = problem(300, 64, 200, torch.float32)
+    weight.data *= 0.1
+    wanted = linear_cross_entropy(x, weight, bias, target, products="bfloat16")
+    gradients = torch.autograd.grad(wanted, (x, weight, bias))
+    with torch.autocast("cpu", torch.bfloat16):
+        loss = linear_cross_entropy(x, weight, bias, target)
+        of_rounded = linear_cross_entropy(x.bfloat16(), weight, bias, target)
+    assert loss.dtype == of_rounded.dtype == torch.float32
+    torch.testing.assert_close(loss, wanted, rtol=0, atol=0)
+    torch.testing.assert_close(of_rounded, wanted, rtol=1e-3, atol=0)
+    for a, b in zip(torch.autograd.grad(loss, (x, weight, bias)), gradients, strict=True):
+        torch.testing.assert_close(a, b, rtol=0, atol=0)
+
+
 def test_extreme_logits_do_not_overflow():
     x = torch.full((2, 1), 1000.0, requires_grad=True)
     weight, bias = torch.tensor([[1.0], [-1.0]]), torch.zeros(2)

@@ -1,16 +1,21 @@
 from __future__ import annotations
 
+import inspect
+
 import numpy as np
 import pytest
 import torch
 import torch.nn.functional as F
+from lightning.fabric.utilities.apply_func import move_data_to_device
 
 from csm.descriptors import Coordinates
+from csm.descriptors.base import record
 from csm.errors import ConfigError
 from csm.learning.loading import LightningData
-from csm.learning.module import Standardisation, random_rotation
-from csm.learning.samples import NetworkInput
+from csm.learning.module import CSMModule, Standardisation, random_rotation
+from csm.learning.samples import NetworkInput, stencils_for
 from csm.matching.nearest import nearest
+from csm.networks import NETWORKS
 from tests.learning.toys import make, train
 from tests.toyset import toy_datamodule
 
@@ -139,3 +144,44 @@ def test_shapes_of_another_template_train_the_same_descriptor_through_a_classifi
     assert module.classifier("others").weight.grad is not None
     assert module.network.classifier.weight.grad is None
     assert all(p.grad is not None for p in module.network.embed.parameters())
+
+
+@pytest.fixture(scope="module")
+def of_all_networks(tmp_path_factory):
+    """Prepared shapes with what every network asks for."""
+    wanted = {s.name: s for name in NETWORKS for s in stencils_for({"name": name, **options_of(name)})}
+    made = LightningData(toy_datamodule(tmp_path_factory.mktemp("all"), stencils=tuple(wanted.values())))
+    made.prepare_data()
+    return made
+
+
+def options_of(name: str) -> dict[str, object]:
+    return {"ks": 20} if "ks" in inspect.signature(NETWORKS[name]).parameters else {}
+
+
+def module_of(name: str, loaded: LightningData, **options: object) -> CSMModule:
+    torch.manual_seed(0)
+    network = {"name": name, **options_of(name), "dropout": 0.0}
+    return CSMModule(network, loaded.n_features, 162, record(loaded.data.recipe.descriptor), basis_k=24, **options)
+
+
+@pytest.mark.parametrize("name", NETWORKS)
+def test_every_network_trains_with_mixed_precision(of_all_networks, tmp_path, name):
+    losses = []
+    for precision in ("32-true", "bf16-mixed"):
+        module = module_of(name, of_all_networks, lr=1e-3)
+        trainer = train(module, of_all_networks, tmp_path, 2, precision=precision, enable_checkpointing=False)
+        losses.append(float(trainer.callback_metrics["train/loss"]))
+        assert all(x.dtype == torch.float32 for x in module.parameters())
+    assert losses[1] == pytest.approx(losses[0], rel=0.02)
+
+
+@pytest.mark.parametrize("name", sorted({*NETWORKS} - {"acscnn", "chebynet"}))  # no sparse tensors without storage
+def test_a_training_step_never_waits_for_the_device(of_all_networks, name):
+    """Tensors of the device "meta" have no values: whoever asks for one, as .item() does, raises an error."""
+    module = module_of(name, of_all_networks, loss_rows=20).to("meta").train()
+    module.log = lambda *_, **__: None
+    sample = move_data_to_device(of_all_networks.sample("toy0"), torch.device("meta"))
+    assert sample.features.device.type == sample.surface.basis.evecs.device.type == "meta"
+    module.training_step(sample).backward()
+    assert module.network.classifier.weight.grad.device.type == "meta"

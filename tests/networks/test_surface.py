@@ -4,6 +4,7 @@ import pytest
 import torch
 
 from csm.networks import Basis, Surface, stencils_of
+from csm.networks.surface import with_cuts
 
 
 @pytest.fixture
@@ -22,6 +23,19 @@ def test_moving_keeps_everything(surface):
     moved = surface.to("meta")
     assert moved.n_vertices == surface.n_vertices == 5
     assert moved.basis.evecs.device.type == moved.stencil("edges")["ends"].device.type == "meta"
+
+
+def test_what_is_read_on_the_host_stays_there(surface):
+    stencils = {
+        "wavelets": {"responses": torch.tensor([[1.0, 2.0], [0.0, 3.0]]), "extents": torch.ones(2, 2)},
+        "edge_splines": {"indptr": torch.tensor([0, 2, 3, 7]), "offsets": torch.tensor([0, 1, 3])},
+    }
+    moved = Surface(surface.basis, with_cuts(stencils)).to("meta")
+    wavelets, splines = moved.stencil("wavelets"), moved.stencil("edge_splines")
+    assert wavelets["used"].tolist() == [1, 2]
+    assert splines["starts"].tolist() == [0, 2, 7]
+    assert wavelets["extents"].device.type == splines["offsets"].device.type == "cpu"
+    assert wavelets["responses"].device.type == splines["indptr"].device.type == "meta"
 
 
 def test_unknown_networks_are_named():
