@@ -68,7 +68,7 @@ def test_ctrl_c_while_a_command_is_loaded_ends_in_order(command, tmp_path):
     (tmp_path / "hydra.py").write_text("raise KeyboardInterrupt\n")
     variables = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
     whole = ["-c", "from csm.commands.main import main; main()", command]
-    for line in (["-m", f"csm.commands.{command}"], whole):
+    for line in (["-m", f"csm.commands.{command.replace('-', '_')}"], whole):
         ended = subprocess.run(
             [sys.executable, *line], cwd=tmp_path, env=variables, capture_output=True, text=True, check=False
         )

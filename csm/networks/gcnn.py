@@ -67,7 +67,7 @@ class GeodesicConv(nn.Module):
         """Convolve the functions `x`, shape (N, C_in), on the shape with these patches.
 
         A chunk of patches is made, compared and forgotten, and made again in the backward pass, so that memory does not
-        grow with S T N.
+        grow with S T N.  Where a chunk begins is asked of the device, for which each chunk waits.
         """
         size = CHUNK * self.weight.shape[0] * self.weight.shape[1]
         parts = []
@@ -111,8 +111,14 @@ def correlation(patches: Tensor, weight: Tensor) -> Tensor:
 def _pooled(x: Tensor, weight: Tensor, patches: Patches) -> Tensor:
     """Return the greatest response over all turns, shape (B, C_out), of B patches."""
     rings, rays, fan_in, _ = weight.shape
+    values = patches.values
     made = functional.embedding_bag(
-        patches.indices, x, patches.indptr, mode="sum", per_sample_weights=patches.values, include_last_offset=True
+        patches.indices,
+        x.to(values.dtype),
+        patches.indptr,
+        mode="sum",
+        per_sample_weights=values,
+        include_last_offset=True,
     )
     return correlation(made.view(-1, rings, rays, fan_in), weight).amax(dim=1)
 
