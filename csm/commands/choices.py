@@ -51,7 +51,7 @@ def options_of(group: str) -> list[str]:
     Examples
     --------
     >>> options_of("data")[:2], options_of("logger")
-    (['humans', 'faust'], ['csv', 'none', 'tensorboard'])
+    (['humans', 'faust'], ['csv', 'mlflow', 'none', 'tensorboard', 'wandb'])
     """
     made = NAMES[group]() if group in NAMES else ()
     files = sorted(path.stem for path in (config_folder() / group).glob("*.yaml"))

@@ -34,6 +34,8 @@ _IN_WORDS = {
     "prep": "bodies to train on (csm bodies)",
     "browser": "tests of pages in a browser",
     "peers": "comparison with pyFM and geomfum (csm bench matching)",
+    "wandb": "logs for Weights & Biases (logger=wandb)",
+    "mlflow": "logs for MLflow (logger=mlflow)",
     "docs": "the site (make docs)",
     "notebooks": "notebooks (docs/notebooks)",
     "dev": "work on csm itself",

@@ -19,7 +19,7 @@ import lightning as L
 import torch
 from lightning.fabric.utilities.exceptions import MisconfigurationException
 from lightning.pytorch.callbacks import ModelCheckpoint
-from lightning.pytorch.loggers import Logger
+from lightning.pytorch.loggers import CSVLogger, Logger, TensorBoardLogger
 
 from csm._locks import locked
 from csm._signals import saying
@@ -260,10 +260,16 @@ def _make_logger(training: Training, folder: Path) -> Logger | bool:
         return False
     try:
         with tempfile.TemporaryDirectory(prefix="csm-") as elsewhere:  # what it refuses, it refuses when it writes
-            _ = getattr(training.logger(save_dir=elsewhere), "experiment", None)
+            tried = training.logger(save_dir=elsewhere)
+            if isinstance(tried, TensorBoardLogger | CSVLogger):  # others may begin a run somewhere
+                _ = tried.experiment
+        return training.logger(save_dir=folder)
+    except ModuleNotFoundError as error:
+        raise ConfigError(
+            f"logger: a library is not installed ({error}); pip install it, or choose logger=csv"
+        ) from error
     except TypeError as error:
         raise ConfigError(f"logger: {error}") from error
-    return training.logger(save_dir=folder)
 
 
 def _quiet_lightning() -> None:

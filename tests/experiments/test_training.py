@@ -9,9 +9,12 @@ import lightning as L
 import numpy as np
 import pytest
 import torch
+from hydra.utils import instantiate
 from lightning.pytorch.callbacks import TQDMProgressBar
 from lightning.pytorch.loggers import CSVLogger
+from omegaconf import OmegaConf
 
+from csm.commands.choices import config_folder
 from csm.data.base import DataModule
 from csm.descriptors.base import record
 from csm.errors import ConfigError, DataError
@@ -199,3 +202,22 @@ def test_a_training_of_several_shapes_per_step_goes_on_as_if_it_had_not_been_sto
     with pytest.raises(ConfigError, match=r"training\.shapes_per_step: 2 there, 1 wanted"):
         fit(of(4, 1), tmp_path / "cut")
     torch.testing.assert_close(fit(of(4), tmp_path / "cut").module.state_dict(), whole, rtol=0, atol=0)
+
+
+def test_a_logger_whose_library_is_missing_is_said_in_a_sentence(tmp_path):
+    def missing(save_dir):
+        raise ModuleNotFoundError("No module named 'wandb'")
+
+    with pytest.raises(
+        ConfigError, match=r"logger: a library is not installed \(No module named 'wandb'\); pip install"
+    ):
+        fit(a_training(tmp_path, logger=missing), tmp_path / "run")
+
+
+@pytest.mark.parametrize("name", ["wandb", "mlflow"])
+def test_other_loggers_write_on_this_machine(tmp_path, monkeypatch, name):
+    pytest.importorskip(name, reason=f'needs pip install "csm[{name}]"')
+    monkeypatch.chdir(tmp_path)
+    logger = instantiate(OmegaConf.load(config_folder() / "logger" / f"{name}.yaml"), _partial_=True)
+    fit(a_training(tmp_path, logger=logger), tmp_path / "run")
+    assert any(name in path.name for path in tmp_path.rglob("*"))
