@@ -45,11 +45,13 @@ def to_trimesh(mesh: Mesh) -> Any:
     >>> to_trimesh(csm.load_humans()[0]).vertices.shape
     (6899, 3)
     """
-    return _library("trimesh").Trimesh(mesh.vertices, mesh.faces, process=False)
+    return _library("trimesh").Trimesh(mesh.vertices.copy(), mesh.faces.copy(), process=False)
 
 
 def from_trimesh(found: Any, name: str = "mesh") -> Mesh:
-    """Return a mesh of a `trimesh.Trimesh`."""
+    """Return a mesh of a `trimesh.Trimesh`; MeshError of what has no faces, such as a point cloud."""
+    if not hasattr(found, "vertices") or not hasattr(found, "faces"):
+        raise MeshError(f"{name}: wanted a trimesh.Trimesh, got a {type(found).__name__}")
     return Mesh(np.asarray(found.vertices, float), _triangles(found.faces, name, "trimesh"), name)
 
 

@@ -7,6 +7,8 @@ from csm.commands.main import run_as_program
 if __name__ == "__main__":
     run_as_program(__file__)
 
+import re
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,8 @@ from csm.commands.outputs import require_file_place, require_new_in_sweep
 from csm.data.bodies.archive import make_bodies
 from csm.errors import ConfigError
 
+_PLAIN = re.compile(r"[\w./-]+", re.ASCII)  # names that Hydra's grammar takes without quotes
+
 
 def run(cfg: DictConfig) -> dict[str, Any]:
     """Write the bodies; return their number."""
@@ -27,12 +31,12 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     out = Path(cfg.out)
     require_file_place(out)
     require_new_in_sweep(out)
-    if out.exists() and not cfg.overwrite:
-        raise ConfigError(f"{out}: is there already; overwrite=true replaces it")
-    made = make_bodies(out, cfg.count, cfg.seed, n_processes(cfg.workers, cfg.count))
+    workers = n_processes(cfg.workers, cfg.count)
+    made = make_bodies(out, cfg.count, cfg.seed, workers, overwrite=cfg.overwrite)
     n = counted(len(made.names), "body")
     print(f"{n} of {made.load(made.names[0]).mesh.n_vertices} vertices: {out} ({out.stat().st_size / 2**20:.1f} MiB)")
-    print(f"to train on them too: csm train experiment=humans 'data.also=[{out}]'")
+    also = shlex.quote("data.also=[{}]".format(out if _PLAIN.fullmatch(str(out)) else f"'{out}'"))
+    print(f"to train on them too: csm train experiment=humans {also}")
     return {"bodies": len(made.names)}
 
 

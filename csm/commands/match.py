@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from hydra.core.hydra_config import HydraConfig
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
@@ -79,14 +80,17 @@ def _require_place(folder: Path, inputs: list[Path], overwrite: bool) -> None:
 
 def _method(cfg: DictConfig) -> tuple[Method, str]:
     """Return the method, and what to call it."""
-    given = cfg.checkpoint or cfg.model
-    if cfg.checkpoint and cfg.model:
+    given = cfg.checkpoint if cfg.checkpoint is not None else cfg.model
+    if cfg.checkpoint is not None and cfg.model is not None:
         raise ConfigError(f"checkpoint={cfg.checkpoint} together with model={cfg.model}: a match takes one network")
     if given is None:
         descriptor = instantiate(cfg.descriptor)
         known = next((name for name, setting in PRESETS.items() if setting == descriptor), None)
         return DescriptorMethod(descriptor), f"the descriptor {known or descriptor}"
-    if cfg.model and cfg.model not in shipped_models():
+    chosen = [text for text in HydraConfig.get().overrides.task if text.lstrip("+~").startswith("descriptor")]
+    if given is not None and chosen:
+        raise ConfigError(f"{chosen[0]} together with a network ({given}), which brings its descriptor; leave one out")
+    if cfg.model is not None and cfg.model not in shipped_models():
         raise ConfigError(
             f"model={cfg.model}: csm brings no such network; wanted {' or '.join(shipped_models())}; "
             "one of your own is given by checkpoint=FILE"

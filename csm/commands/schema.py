@@ -55,6 +55,7 @@ RANGES: Mapping[str, Range] = {
     "unused_days": Range(False, 0, none=True),
     "debris": Range(False, 0, 1, none=True),
     "tolerance": Range(False, 0, 1),
+    "count": _SOME,
     "trainer.max_epochs": _COUNT,
     "trainer.accumulate_grad_batches": _SOME,
     "trainer.num_nodes": _SOME,

@@ -15,7 +15,7 @@ from omegaconf import DictConfig
 from csm.commands.app import command
 from csm.commands.outputs import require_file_place
 from csm.errors import ConfigError, DataError
-from csm.experiments.sweeps import write_sweep_report
+from csm.experiments.sweeps import is_report, write_sweep_report
 
 _PAGE = "sweep.html"
 
@@ -26,11 +26,12 @@ def run(cfg: DictConfig) -> dict[str, Any]:
         raise ConfigError("sweep-report needs the folder of a sweep: csm sweep-report outputs/train_sweep/DATE")
     folder = Path(cfg.folder)
     if not folder.is_dir():
-        raise DataError(f"{folder}: there is no such folder")
+        what = "this is a file, wanted the folder of a sweep" if folder.exists() else "there is no such folder"
+        raise DataError(f"{folder}: {what}")
     out = Path(cfg.out) if cfg.out else folder / _PAGE
     require_file_place(out)
-    if cfg.out and out.exists() and not cfg.overwrite:
-        raise ConfigError(f"{out}: is there already; overwrite=true replaces it")
+    if out.exists() and not cfg.overwrite and not is_report(out):
+        raise ConfigError(f"{out}: is there already, and is no page of this command; overwrite=true replaces it")
     best = write_sweep_report(folder, out, cfg.by)
     settings = " ".join(f"{key}={value}" for key, value in best.settings.items())
     print(f"the best is job {best.name}: {settings}\n{out}")

@@ -24,11 +24,19 @@ class Additional:
         The set, and which of its shapes.
     template
         What the template of the set is called; empty if it is that of the training set, whose classifier they share.
+    digest
+        Hash of the file that they come from, where they come from one.
     """
 
     shapes: ShapeSet
     names: tuple[str, ...]
     template: str = ""
+    digest: str = ""
+
+    @property
+    def label(self) -> str:
+        """What tells these shapes from others, for records."""
+        return f"{self.shapes.name} ({self.digest})" if self.digest else self.shapes.name
 
     @property
     def n_classes(self) -> int:
@@ -56,10 +64,12 @@ def additional(text: str, train_set: ShapeSet, names: Sequence[str], store: Stor
         If the name has another form.
     """
     template = "" if getattr(train_set, "built_in", False) else _HUMANS
-    file, _, other = text.partition(":")
-    if file.endswith(".npz") and (not other or _variant(other)):
-        bodies: ShapeSet = load("csm.data.bodies.archive:Bodies")(file)
-        return Additional(_with_triangles(bodies, other, store), bodies.names, template)
+    file, colon, other = text.rpartition(":")
+    if not (file.endswith(".npz") and colon and _variant(other)):
+        file, other = text, ""
+    if file.endswith(".npz"):
+        bodies = load("csm.data.bodies.archive:Bodies")(file)
+        return Additional(_with_triangles(bodies, other, store), bodies.names, template, bodies.digest)
     if text == "humans" or (text.startswith("humans_") and _variant(text.removeprefix("humans_"))):
         humans = load("csm.data.humans:HumansSet")()
         shapes = _with_triangles(humans, text.removeprefix("humans").removeprefix("_"), store)
@@ -76,7 +86,7 @@ def additional(text: str, train_set: ShapeSet, names: Sequence[str], store: Stor
 def _variant(text: str) -> tuple[Variant, int] | None:
     """Return what "remeshed_5000" or "refined_5000" says, None of another text."""
     form, _, count = text.partition("_")
-    if not count.isdigit() or int(count) == 0:
+    if not (count.isascii() and count.isdigit()) or int(count) == 0:
         return None
     return ("refined", int(count)) if form == "refined" else ("remeshed", int(count)) if form == "remeshed" else None
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +24,7 @@ MEAN_ERROR = "mean test error"
 _RESULT = "result.json"
 _SHOWN = ("status", "seconds", "train/loss", "val/age")
 _SEED = "seed"
+_MARK = "Made by csm sweep-report."
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,8 @@ class SweepJob:
         "ok" or "failed", and why.
     losses
         The training loss of each epoch, empty where there is no log.
+    overrides
+        The options as they were typed.
     """
 
     name: str
@@ -49,6 +53,7 @@ class SweepJob:
     status: str = "ok"
     error: str = ""
     losses: tuple[float, ...] = ()
+    overrides: tuple[str, ...] = ()
 
     def value(self, quantity: str) -> float | None:
         """Return a quantity of the job: a number that it returned, or `MEAN_ERROR`; None if it has none."""
@@ -68,10 +73,10 @@ def read_sweep(folder: Path) -> list[SweepJob]:
     """
     files = sorted(folder.glob(f"*/{_RESULT}"), key=lambda path: (len(path.parent.name), path.parent.name))
     if not files:
-        raise DataError(
-            f"{folder}: there are no jobs with {_RESULT}; wanted the folder of a sweep, such as "
-            "outputs/train_sweep/DATE"
+        what = (
+            "this is one training, not a sweep" if (folder / _RESULT).is_file() else f"there are no jobs with {_RESULT}"
         )
+        raise DataError(f"{folder}: {what}; wanted the folder of a sweep, such as outputs/train_sweep/DATE")
     return [_job(path) for path in files]
 
 
@@ -80,7 +85,10 @@ def _job(path: Path) -> SweepJob:
         record = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:
         raise DataError(f"{path}: not a result of a job ({error})") from error
-    pairs = [text.lstrip("+~").split("=", 1) for text in record.pop("overrides", ()) if "=" in text]
+    if not isinstance(record, dict) or "status" not in record:
+        raise DataError(f"{path}: not a result of a job: it has no status")
+    overrides = [str(text) for text in record.pop("overrides", ())]
+    pairs = [text.lstrip("+~").split("=", 1) for text in overrides if "=" in text]
     numbers = {key: float(value) for key, value in record.items() if isinstance(value, int | float)}
     return SweepJob(
         path.parent.name,
@@ -89,6 +97,7 @@ def _job(path: Path) -> SweepJob:
         str(record.get("status", "ok")),
         str(record.get("error", "")),
         tuple(_losses(path.parent)),
+        tuple(overrides),
     )
 
 
@@ -186,8 +195,13 @@ def write_sweep_report(folder: Path, out: Path, by: str | None = None) -> SweepJ
         *_curves(ranked),
     ]
     lead = f"{counted(len(jobs), 'job')} in {folder.name}, compared by {quantity}; the smallest is the best."
-    write_html(out, report_html("A sweep", sections, lead=lead))
+    write_html(out, report_html("A sweep", sections, lead=lead, footer=_MARK))
     return best
+
+
+def is_report(path: Path) -> bool:
+    """Tell whether a file is a page that `write_sweep_report` has written."""
+    return _MARK in path.read_text(encoding="utf-8", errors="replace")
 
 
 def _best_in_words(ranked: Sequence[SweepJob], quantity: str) -> str:
@@ -203,7 +217,7 @@ def _best_in_words(ranked: Sequence[SweepJob], quantity: str) -> str:
 
 
 def _command(job: SweepJob) -> str:
-    return "csm train " + " ".join(f"{key}={value}" for key, value in job.settings.items())
+    return " ".join(["csm train", *map(shlex.quote, job.overrides)])
 
 
 def _table(jobs: Sequence[SweepJob], quantity: str) -> Table:

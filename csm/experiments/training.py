@@ -214,7 +214,7 @@ def make_module(
         training={
             "name": training.name,
             "set": data.train_set.name,
-            "also": [more.shapes.name for more in data.also],
+            "also": [more.label for more in data.also],
             "protocol": data.protocol,
             "seed": training.seed,
             "epochs": epochs,

@@ -63,7 +63,10 @@ def load_module(path: str | os.PathLike[str]) -> CSMModule:
         raise ConfigError(f"a checkpoint is given by its path, got a {type(path).__name__}")
     path = Path(path)
     if not path.is_file():
-        raise DataError(f"{path}: there is no such checkpoint; csm train writes model.ckpt into its output folder")
+        raise DataError(
+            f"{path}: there is no such checkpoint; csm train writes model.ckpt into its output folder, and csm brings "
+            "the network humans"
+        )
     try:
         return _load_export(path) if path.suffix == ".json" else _load_checkpoint(path)
     except CsmError:

@@ -1,7 +1,10 @@
 from __future__ import annotations
 
+import shlex
+
 import pytest
 
+from csm.commands.words import to_overrides
 from csm.data.bodies import archive
 from csm.data.bodies.archive import Bodies
 from csm.data.humans import load_humans
@@ -33,9 +36,20 @@ def test_bodies_are_written_and_what_is_there_is_left(csm, tmp_path, humans_inst
 
 @pytest.mark.parametrize(
     ("words", "said"),
-    [((), "bodies need a place"), (("a.txt",), "ends with .npz"), (("a.npz", "count=0"), "count of at least 1")],
+    [
+        ((), "bodies need a place"),
+        (("a.txt",), "ends with .npz"),
+        (("a.npz", "count=0"), "count=0: wanted a whole number from 1"),
+        (("a.npz", "count=abc"), "count=abc: wanted a whole number from 1"),
+    ],
 )
 def test_what_cannot_work_is_said_at_once(csm, words, said):
     status, _, error = csm("bodies", *words)
     assert status == 2
     assert said in error
+
+
+def test_the_line_that_trains_on_them_can_be_pasted(csm, humans_instead):
+    out = csm("bodies", "a b=c.npz", "count=1", "workers=0")[1]
+    words = shlex.split(out.split("csm train ")[1])
+    assert to_overrides("train", words) == ["experiment=humans", "data.also=['a b=c.npz']"]

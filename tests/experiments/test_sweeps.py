@@ -24,7 +24,13 @@ def sweep(tmp_path):
     """Twelve jobs whose error is that of ks, plus a little of the rate; the seed does nothing."""
     for k, (ks, rate, seed) in enumerate(product((32, 64, 128), ("0.001", "0.003"), (0, 1))):
         error = 1 / ks + (0.001 if rate == "0.001" else 0.0)
-        overrides = ["experiment=humans", f"model.ks={ks}", f"optimizer.lr={rate}", f"seed={seed}"]
+        overrides = [
+            "experiment=humans",
+            "+trainer.limit_train_batches=2",
+            f"model.ks={ks}",
+            f"optimizer.lr={rate}",
+            f"seed={seed}",
+        ]
         place = write_job(tmp_path, str(k), overrides, **{"age/a": error, "age/b": 3 * error, "train/loss": 9.0 - k})
         with SummaryWriter(place / "tensorboard") as log:
             for step in range(6):
@@ -57,7 +63,7 @@ def test_the_page_names_the_best_and_holds_every_job(sweep):
     assert best.settings["model.ks"] == "128"
     assert best.settings["optimizer.lr"] == "0.003"
     page = (sweep / "sweep.html").read_text()
-    assert "csm train experiment=humans model.ks=128 optimizer.lr=0.003" in page
+    assert "csm train experiment=humans +trainer.limit_train_batches=2 model.ks=128 optimizer.lr=0.003" in page
     assert "failed: no memory" in page
     for heading in ("The best", "All jobs, best first", "What each parameter does", "Training losses"):
         assert f"<h2>{heading}</h2>" in page
@@ -73,6 +79,10 @@ def test_what_is_no_sweep_is_named(tmp_path):
     with pytest.raises(DataError, match=r"there are no jobs with result\.json; wanted the folder of a sweep"):
         read_sweep(tmp_path)
     write_job(tmp_path, "0", [])
-    (tmp_path / "0" / "result.json").write_text("{")
-    with pytest.raises(DataError, match=r"0/result\.json: not a result of a job"):
+    for content in ("{", "[]", "{}"):
+        (tmp_path / "0" / "result.json").write_text(content)
+        with pytest.raises(DataError, match=r"0/result\.json: not a result of a job"):
+            read_sweep(tmp_path)
+    (tmp_path / "0" / "result.json").rename(tmp_path / "result.json")
+    with pytest.raises(DataError, match="this is one training, not a sweep"):
         read_sweep(tmp_path)
