@@ -201,6 +201,11 @@ def _of_launchers(kind: str, text: str) -> str | None:
             "hydra/launcher=submitit_slurm: there is no Slurm on this machine (no srun); start the sweep where jobs "
             "are submitted, or take hydra/launcher=submitit_local, joblib or ray"
         )
+    if "current node timed out during startup" in text:
+        return (
+            "hydra/launcher=ray: Ray did not start in time on this machine, which may be busy or short of memory; set "
+            "RAY_raylet_start_wait_time_s=300 in the environment, or take hydra/launcher=joblib"
+        )
     if kind in ("TerminatedWorkerError", "WorkerCrashedError", "UncompletedJobError"):
         return (
             "a process of the sweep was ended from outside, perhaps because memory ran out; what its jobs have "

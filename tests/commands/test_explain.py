@@ -79,6 +79,8 @@ def test_missing_extras_and_memory_are_named():
 def test_errors_of_launchers_say_what_to_do():
     slurm = RuntimeError('Could not detect "srun", are you indeed on a slurm cluster?')
     assert "submitit_local, joblib or ray" in str(explained(slurm, "train"))
+    slow = Exception("The current node timed out during startup. This could happen because some of the raylet failed")
+    assert "RAY_raylet_start_wait_time_s" in str(explained(slow, "train"))
     killed = type("TerminatedWorkerError", (Exception,), {})()
     assert "the same folder (hydra.sweep.dir) goes on" in str(explained(killed, "train"))
     parted = RuntimeError("[gloo/transport/tcp/pair.cc:534] Connection closed by peer [127.0.0.1]:5")

@@ -26,6 +26,9 @@ ACD = ("descriptor.angles=4", "descriptor.k=8", "descriptor.order=3")
 NETWORK = ("model.channels=[16,16]", "model.descriptor_channels=24", "model.ks=20", "trainer.accelerator=cpu")
 RAY = ("hydra/launcher=ray", "+hydra.launcher.ray.init.num_cpus=2", "+hydra.launcher.ray.init.include_dashboard=false")
 
+PATIENT = {"RAY_raylet_start_wait_time_s": "900", "RAY_worker_register_timeout_seconds": "900"}
+"""For Ray on a machine that is busy with other things."""
+
 
 def job(folder, number: int, overrides: list[str], result: dict) -> None:
     (folder / str(number)).mkdir(parents=True)
@@ -82,7 +85,7 @@ def start(folder: Path, command: str, *words: str) -> subprocess.Popen[str]:
     """Start a sweep in a folder with toys, as a user does."""
     if not (folder / "toys").exists():
         write_toys(folder / "toys", 8)
-    environment = os.environ | {"CSM_CACHE": str(folder / "store"), "PYTHONPATH": str(ROOT)}
+    environment = os.environ | {"CSM_CACHE": str(folder / "store"), "PYTHONPATH": str(ROOT)} | PATIENT
     call = [sys.executable, "-m", f"csm.commands.{command}", "-m", *TOYS, *ACD, *words]
     pipe = subprocess.PIPE
     return subprocess.Popen(call, cwd=folder, env=environment, stdout=pipe, stderr=pipe, text=True)
