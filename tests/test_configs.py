@@ -25,7 +25,7 @@ from tests.surfaces import surface_of
 
 CONF = config_folder()
 for name in COMMANDS:  # the commands register the groups that they use
-    importlib.import_module(f"csm.commands.{name}")
+    importlib.import_module(f"csm.commands.{name.replace('-', '_')}")
 
 
 def names(group: str) -> list[str]:

@@ -47,7 +47,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     import numpy  # noqa: F401 - its BLAS is listed once it is loaded
 
     missing = missing_of(metadata.requires(DISTRIBUTION) or [])
-    sets = data_sets(cfg.data)
+    sets = data_sets(cfg.folder)
     rows = [
         ("machine", f"{platform.platform()}, {counted(os.cpu_count() or 1, 'core')}, {memory()}"),
         ("versions", ", ".join(f"{name} {version}" for name, version in provenance().versions.items())),
@@ -55,7 +55,10 @@ def run(cfg: DictConfig) -> dict[str, Any]:
         ("devices", devices()),
         ("store", store_in_words(Store(cfg.store))),
         ("networks", ", ".join(shipped_models())),
-        ("data sets", "; ".join(sets) or "none found: set CSM_DATA, or data=FOLDER (csm check FOLDER looks into one)"),
+        (
+            "data sets",
+            "; ".join(sets) or "none found: set CSM_DATA, or folder=FOLDER (csm check FOLDER looks into one)",
+        ),
         *(("extra " + name, text) for name, text in extras(missing).items()),
     ]
     width = max(len(name) for name, _ in rows)

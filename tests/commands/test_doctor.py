@@ -8,7 +8,7 @@ from tests.shapes import blob
 
 
 def test_what_is_found_is_printed_row_by_row(csm, tmp_path):
-    status, out, _ = csm("doctor", f"data={tmp_path}")
+    status, out, _ = csm("doctor", f"folder={tmp_path}")
     assert status == 0
     rows = dict(line.split("  ", 1) for line in out.splitlines() if "  " in line)
     assert {"machine", "versions", "BLAS", "devices", "store", "networks", "data sets"} <= rows.keys()
@@ -21,7 +21,7 @@ def test_what_is_found_is_printed_row_by_row(csm, tmp_path):
 @pytest.mark.data
 def test_data_sets_are_named_with_their_places(csm, data_set):
     folder = data_set("SCAPE_5000")
-    assert f"SCAPE_5000 ({folder})" in csm("doctor", f"data={folder.parent}")[1]
+    assert f"SCAPE_5000 ({folder})" in csm("doctor", f"folder={folder.parent}")[1]
 
 
 def test_extras_are_told_from_requirements_and_from_other_markers():

@@ -58,6 +58,7 @@ def test_two_processes_train_and_one_of_them_tests(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_a_process_that_fails_ends_all_and_says_why(tmp_path):
     ran = start(tmp_path, "trainer.max_epochs=3", "optimizer.lr=1e30", "hydra.run.dir=run")
     _, errors = ran.communicate(timeout=900)
@@ -68,8 +69,8 @@ def test_a_process_that_fails_ends_all_and_says_why(tmp_path):
     assert not (tmp_path / "run/model.ckpt").exists()
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of Unix")
+@pytest.mark.long
 def test_sigterm_and_a_kill_end_all_and_the_same_command_goes_on(tmp_path):
     words = ("trainer.max_epochs=400", "hydra.run.dir=run", "test=false")
     ran, last = start(tmp_path, *words), tmp_path / "run/checkpoints/last.ckpt"

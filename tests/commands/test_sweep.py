@@ -65,6 +65,7 @@ def test_differing_columns_make_one_table(tmp_path):
     assert (tmp_path / "a.csv").read_text().split() == ["a,b", "1,", "3,2"]
 
 
+@pytest.mark.long
 def test_a_finished_job_is_not_done_again_and_a_changed_one_is(csm, tmp_path):
     write_toys(tmp_path / "toys")
     words = ["-m", *TOYS, *ACD, *NETWORK, "seed=0,1", "hydra.sweep.dir=s", "trainer.max_epochs=1", "metric.points=9"]

@@ -109,3 +109,8 @@ def test_features_and_votes_are_made_on_the_device(tmp_path):
 def test_what_is_no_network_is_named(tmp_path):
     with pytest.raises(DataError, match="no such checkpoint"):
         load_model(tmp_path / "gone.ckpt")
+
+
+def test_the_key_of_an_export_is_the_same_whenever_it_is_loaded(tmp_path):
+    file = export_module(module_for(), tmp_path / "export")
+    assert load_model(file).key == load_model(file).key
