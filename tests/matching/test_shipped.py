@@ -33,7 +33,7 @@ def test_they_are_found_by_name_and_small():
     assert load_model("humans", "mine").name == "mine"
     assert load_model("humans").key == load_model(shipped_file("humans")).key
     assert sum(path.stat().st_size for path in (FOLDER / "humans").iterdir()) < 3_000_000
-    with pytest.raises(ConfigError, match="there is no preset"):
+    with pytest.raises(ConfigError, match="there is no descriptor 'dogs'"):
         as_method("dogs")
 
 
