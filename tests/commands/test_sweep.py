@@ -128,7 +128,7 @@ def test_a_training_whose_worker_is_killed_ends_as_if_it_had_not_been(tmp_path):
     assert "was finished by an earlier run" in said  # Ray shows lines that are alike once
     assert [(path.stat().st_mtime_ns, path.read_bytes()) for path in weights] == kept
 
-    finish(start(tmp_path, "train", *words[:-2], "seed=1,", "hydra.sweep.dir=undisturbed"))
+    finish(start(tmp_path, "train", *words[:-2], "seed=1", "hydra.sweep.dir=undisturbed"))
     assert (tmp_path / "undisturbed/0/export/model.safetensors").read_bytes() == kept[1][1]
 
 
