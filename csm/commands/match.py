@@ -88,7 +88,7 @@ def _method(cfg: DictConfig) -> tuple[Method, str]:
         known = next((name for name, setting in PRESETS.items() if setting == descriptor), None)
         return DescriptorMethod(descriptor), f"the descriptor {known or descriptor}"
     chosen = [text for text in HydraConfig.get().overrides.task if text.lstrip("+~").startswith("descriptor")]
-    if given is not None and chosen:
+    if chosen:
         raise ConfigError(f"{chosen[0]} together with a network ({given}), which brings its descriptor; leave one out")
     if cfg.model is not None and cfg.model not in shipped_models():
         raise ConfigError(

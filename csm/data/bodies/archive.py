@@ -120,8 +120,7 @@ class Bodies:
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        self.path = Path(path)
-        self.path = self.path.expanduser()
+        self.path = Path(path).expanduser()
         if self.path.is_dir():
             raise DataError(f"{self.path}: this is a folder, wanted a file that `csm bodies` has written")
         if not self.path.is_file():
