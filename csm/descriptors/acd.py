@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from csm._types import FloatArray
+from csm._types import FloatArray, IntArray
 from csm.descriptors.angular import ByAngle
 from csm.descriptors.base import Features
 from csm.descriptors.stack import Stack
@@ -135,6 +135,19 @@ class ACD(ByAngle):
     @property
     def _ks(self) -> range:
         return range(self.k, self.k - self.cuts, -1)
+
+    def mirrored_columns(self) -> IntArray:
+        """Return where the columns of a mirror image are: those of the angle -theta, which is pi - theta.
+
+        Raises
+        ------
+        ConfigError
+            If the frame is "released", which depends on the axes of the world.
+        """
+        if self.frame == "released":
+            return super().mirrored_columns()
+        columns = np.arange(len(self.columns)).reshape(self.angles, -1)
+        return columns[-np.arange(self.angles) % self.angles].ravel()
 
     def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, one column per name, in units of 1/area unless normalised."""

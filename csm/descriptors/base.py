@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from csm._counts import counted
-from csm._types import FloatArray
+from csm._types import FloatArray, IntArray
+from csm.errors import ConfigError
 from csm.mesh.inputs import MeshLike, as_mesh
 from csm.operators.operators import Operators
 
@@ -116,6 +117,18 @@ class Descriptor(ABC):
     @abstractmethod
     def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex of the mesh of `operators`, which is without debris."""
+
+    def mirrored_columns(self) -> IntArray:
+        """Return which column of a shape is which of its mirror image: column i there is column ``[i]`` here.
+
+        Shape (Q,).  It makes the descriptor of a mirror image without computing it.
+
+        Raises
+        ------
+        ConfigError
+            If that is not known of this descriptor.
+        """
+        raise ConfigError(f"{self.name}: it is not known how its columns change when a shape is mirrored")
 
     def parameters(self) -> dict[str, Any]:
         """Return the parameters as plain data, without those of `added` that have their neutral value."""

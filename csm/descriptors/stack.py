@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from csm._types import IntArray
 from csm.descriptors.base import Descriptor, Features, record
 from csm.errors import ConfigError
 from csm.operators.operators import Operators
@@ -55,6 +56,13 @@ class Stack(Descriptor):
         found = {name: part(operators) for name, part in self.parts.items()}
         columns = (f"{name} {column}" for name, features in found.items() for column in features.columns)
         return Features(np.hstack([features.values for features in found.values()]), tuple(columns))
+
+    def mirrored_columns(self) -> IntArray:
+        """Return where the columns of a mirror image are, part by part."""
+        found: list[IntArray] = []
+        for part in self.parts.values():
+            found.append(part.mirrored_columns() + sum(map(len, found)))
+        return np.concatenate(found)
 
     def parameters(self) -> dict[str, Any]:
         """Return the record of every part as plain data."""

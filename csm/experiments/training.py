@@ -46,6 +46,7 @@ from csm.experiments.tensorboard import TensorBoardPanels
 from csm.learning.checkpoint import export_module
 from csm.learning.loading import LightningData
 from csm.learning.module import CSMModule
+from csm.learning.samples import also_classes
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +141,8 @@ def _fit(training: Training, trainer: L.Trainer, folder: Path, resume: Path | st
     module = make_module(training, loaded.n_features, trainer.max_epochs, shapes_per_step(trainer))
     if module.inputs is not None:
         module.inputs.learn(sample.features for sample in loaded.fitted())
+    if module.places is not None:
+        module.places.learn(loaded.sample(training.data.fit_names[0]))
     if trainer.global_rank:
         torch.manual_seed(training.seed + trainer.global_rank)  # weights and order are those of rank 0, dropout is not
     begun = time.perf_counter()
@@ -209,7 +212,7 @@ def make_module(
         n_classes=data.n_classes,
         descriptor=record(data.recipe.descriptor),
         basis_k=data.recipe.basis_k,
-        also_classes=data.also_classes,
+        also_classes=also_classes(data, bool(training.options.get("mirror"))),
         **training.options,
         training={
             "name": training.name,

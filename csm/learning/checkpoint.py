@@ -40,7 +40,7 @@ def export_module(module: CSMModule, folder: Path, *, classifier: bool = False) 
     weights = {
         name: tensor.detach().cpu().contiguous()
         for name, tensor in module.weights().items()
-        if classifier or not name.startswith("classifier.")
+        if classifier or module.places is not None or not name.startswith("classifier.")
     }
     with atomic_path(folder / WEIGHTS) as temporary:
         save_file(weights, temporary)

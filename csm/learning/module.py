@@ -13,9 +13,12 @@ from torch.optim import Adam
 from torch.optim.lr_scheduler import CosineAnnealingLR, LRScheduler, OneCycleLR, StepLR
 
 from csm.descriptors import Coordinates
+from csm.descriptors.presets import from_parameters
 from csm.errors import ConfigError
 from csm.learning.loss import Products, linear_cross_entropy
+from csm.learning.places import Places
 from csm.learning.samples import NetworkInput, ShapeSample
+from csm.learning.variation import Variation
 from csm.networks import Surface, build
 
 Schedule = Literal["constant", "cosine", "step", "drop", "one_cycle"]
@@ -58,12 +61,23 @@ class CSMModule(L.LightningModule):
     standardise
         Give every column of the input mean 0 and deviation 1 over the training shapes, and cut what is more than 10
         deviations off (`Standardisation`).
+    vary
+        How much every column of the standardised input is scaled and shifted at random in every training step
+        (`Variation`); 0 for not at all.
+    mirror
+        Share of training steps that see the mirror image of their shape, whose input is that of the shape with its
+        columns in another order (`csm.descriptors.base.Descriptor.mirrored_columns`).
+    places
+        Describe a vertex by where on the template the classifier sees it, in this many of the template's
+        eigenfunctions (`Places`); 0: by the network's last layer.
     rotate
         Turn the input features, which must be vertex positions (descriptor "xyz"), by a rotation drawn anew in every
         training step, any as likely as any other, so that the network learns not to depend on how a shape stands.
     training
         How the checkpoint came about (data, split, seed), free plain data for its reader.
     """
+
+    image_columns: Tensor
 
     def __init__(
         self,
@@ -79,6 +93,9 @@ class CSMModule(L.LightningModule):
         loss_products: Products = "float32",
         loss_rows: int | None = None,
         standardise: bool = False,
+        vary: float = 0.0,
+        mirror: float = 0.0,
+        places: int = 0,
         rotate: bool = False,
         training: dict[str, Any] | None = None,
         format: int = FORMAT,
@@ -100,6 +117,11 @@ class CSMModule(L.LightningModule):
             )
         self.has_classifier = True
         self.inputs = Standardisation(in_channels) if standardise else None
+        self.variation = self._variation(vary, standardise)
+        self.mirror = mirror
+        columns = torch.from_numpy(from_parameters(**descriptor).mirrored_columns()) if mirror else torch.zeros(0)
+        self.register_buffer("image_columns", columns, persistent=False)
+        self.places = self._places(n_classes, places, basis_k)
         width = self.network.classifier.in_features
         self.others = nn.ModuleDict({name: nn.Linear(width, n) for name, n in (also_classes or {}).items()})
         self.lr, self.weight_decay, self.schedule = lr, weight_decay, schedule
@@ -115,22 +137,43 @@ class CSMModule(L.LightningModule):
         self.loss_rows = loss_rows
 
     def forward(self, features: Tensor, surface: Surface) -> Tensor:
-        """Return the learned descriptor, shape (N, Q)."""
-        return self.network.describe(features if self.inputs is None else self.inputs(features), surface)
+        """Return the network's last layer before the classifier, shape (N, Q)."""
+        x = features if self.inputs is None else self.inputs(features)
+        return self.network.describe(self.variation(x), surface)
+
+    @torch.no_grad()
+    def descriptor(self, last: Tensor) -> Tensor:
+        """Return the learned descriptor, of the network's last layer, shape (N, Q): that itself, or the places."""
+        return last if self.places is None else self.places(last, self.network.classifier)
 
     def weights(self) -> dict[str, Tensor]:
-        """Return the tensors that a trained network consists of: those of the network, and of its standardisation."""
+        """Return the tensors that a trained network consists of: those of the network, standardisation and places."""
         found = dict(self.network.state_dict())
-        return found if self.inputs is None else found | self.inputs.state_dict(prefix="inputs.")
+        for name, part in (("inputs.", self.inputs), ("places.", self.places)):
+            found |= {} if part is None else part.state_dict(prefix=name)
+        return found
 
-    def loss(self, descriptor: Tensor, sample: ShapeSample) -> Tensor:
+    def _variation(self, spread: float, standardise: bool) -> Variation:
+        if spread and not standardise:
+            raise ConfigError("learning.vary is in deviations of a standardised input: set learning.standardise=true")
+        return Variation(spread)
+
+    def _places(self, n_classes: int, k: int, basis_k: int) -> Places | None:
+        if k > basis_k:
+            raise ConfigError(f"learning.places={k}, and the data hold {basis_k} eigenfunctions: set data.basis_k={k}")
+        try:
+            return Places(n_classes, k) if k else None
+        except ValueError as error:
+            raise ConfigError(f"learning.places: {error}") from error
+
+    def loss(self, last: Tensor, sample: ShapeSample) -> Tensor:
         """Cross-entropy of the classifier over the rows with a known template point (in training, a draw of them)."""
         classifier = self.classifier(sample.template)
         rows, classes = sample.rows, sample.classes
         if self.training and self.loss_rows is not None and self.loss_rows < len(rows):
             drawn = torch.randperm(len(rows), device=rows.device)[: self.loss_rows]
             rows, classes = rows[drawn], classes[drawn]
-        x = self.network.dropout(descriptor[rows])
+        x = self.network.dropout(last[rows])
         weight, bias = classifier.weight, classifier.bias
         return linear_cross_entropy(x, weight, bias, classes, products=self.loss_products)
 
@@ -142,6 +185,7 @@ class CSMModule(L.LightningModule):
 
     def training_step(self, sample: ShapeSample) -> Tensor:
         """One shape: loss of its labelled vertices."""
+        sample = self._seen(sample)
         features = sample.features
         if self.rotate:
             features = features @ random_rotation().to(features, non_blocking=True)
@@ -149,20 +193,30 @@ class CSMModule(L.LightningModule):
         self.log("train/loss", loss, on_step=False, on_epoch=True, prog_bar=True, batch_size=1, sync_dist=True)
         return loss
 
+    def _seen(self, sample: ShapeSample) -> ShapeSample:
+        """Return the shape or its mirror image."""
+        if not self.mirror or sample.mirrored is None or torch.rand(()).item() >= self.mirror:
+            return sample
+        return sample._replace(features=sample.features[:, self.image_columns], **sample.mirrored._asdict())
+
     def validation_step(self, sample: ShapeSample) -> Tensor:
         """Return the learned descriptor of one shape; the loss is logged, the errors are a callback's business."""
-        descriptor: Tensor = self(sample.features, sample.surface)
-        loss = self.loss(descriptor, sample)
-        self.log("val/loss", loss, prog_bar=True, batch_size=sample.counts, sync_dist=True)
-        return descriptor
+        last = self(sample.features, sample.surface)
+        self.log("val/loss", self.loss(last, sample), prog_bar=True, batch_size=sample.counts, sync_dist=True)
+        return self.descriptor(last)
 
     @torch.no_grad()
     def describe(self, given: NetworkInput) -> Tensor:
         """Return the learned descriptor of a shape in evaluation mode, shape (N, Q), on the device of the module."""
+        return self.descriptor(self.last_layer(given))
+
+    @torch.no_grad()
+    def last_layer(self, given: NetworkInput) -> Tensor:
+        """Return what the classifier takes of a shape, in evaluation mode, on the device of the module."""
         self.eval()
         features, surface = given.to(self.device)
-        descriptor: Tensor = self(features, surface)
-        return descriptor
+        found: Tensor = self(features, surface)
+        return found
 
     def configure_optimizers(self) -> Any:
         """Adam with the chosen schedule, stepped once per training step."""

@@ -127,6 +127,8 @@ class Described:
         Where eigenpairs are looked up and kept; without one they are computed.
     given
         Shape (N, Q'): the handcrafted descriptor that a network was given; None for other methods.
+    classified
+        Shape (N, Q''): what the classifier takes; None if it takes the features.
     """
 
     mesh: Mesh
@@ -134,6 +136,7 @@ class Described:
     classifier: Classifier | None = None
     store: Store | None = None
     given: Tensor | None = None
+    classified: Tensor | None = None
 
     def __repr__(self) -> str:
         return f"Described({self.mesh!r}, {self.rows.shape[1]} features)"
@@ -158,7 +161,7 @@ class Described:
                 f"{self.mesh.label}: matching through the classifier needs a trained network with its classifier; a "
                 "descriptor has none, and an export leaves it out: use the .ckpt file"
             )
-        return votes(self.features, self.classifier)
+        return votes(self.features if self.classified is None else self.classified, self.classifier)
 
     def spectrum(self, k: int) -> Spectrum:
         """Return the first `k` Laplace-Beltrami eigenpairs of the mesh at unit area."""

@@ -70,12 +70,13 @@ class NetworkMethod(Method):
         """Return the learned descriptor of a mesh, computed on the device."""
         self.module.to(device)
         prepared = prepare_mesh(mesh, self.recipe, store)
-        features = self.module.describe(network_input(prepared))
+        last = self.module.last_layer(network_input(prepared))
         classifier = None
         if self.module.has_classifier:
             linear = self.module.network.classifier
             classifier = Classifier(linear.weight.detach(), linear.bias.detach())
-        return Described(mesh, features, classifier, store, torch.from_numpy(prepared.features).to(features.device))
+        given = torch.from_numpy(prepared.features).to(last.device)
+        return Described(mesh, self.module.descriptor(last), classifier, store, given, last)
 
 
 def load_model(path: str | os.PathLike[str], name: str = "") -> NetworkMethod:

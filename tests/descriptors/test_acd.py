@@ -64,6 +64,21 @@ def test_mirror_image_reverses_the_angles(angles):
     assert np.abs(image - original).max() > 1e-2 * scale
 
 
+@pytest.mark.parametrize("descriptor", [ACD(angles=5), ACD.release(frame="smooth"), ACD.two_bands()])
+def test_the_columns_of_a_mirror_image_are_known(descriptor):
+    mesh = blob(2)
+    original, image = descriptor(mesh).values, descriptor(mirrored(mesh)).values
+    columns = descriptor.mirrored_columns()
+    np.testing.assert_allclose(image, original[:, columns], atol=1e-7 * np.abs(original).max())
+    np.testing.assert_array_equal(columns[columns], np.arange(len(columns)))
+    assert np.abs(image - original).max() > 1e-2 * np.abs(original).max()
+
+
+def test_a_frame_of_the_world_has_no_mirrored_columns():
+    with pytest.raises(ConfigError, match="not known how its columns change"):
+        ACD.release(frame="released").mirrored_columns()
+
+
 def test_inside_out_reverses_the_angles_and_turns_them_by_a_right_angle():
     descriptor, mesh = paper(angles=8, k=20), blob(3)
     turned = blocks(descriptor, replace(mesh, faces=mesh.faces[:, ::-1]))

@@ -8,12 +8,12 @@ import torch
 import torch.nn.functional as F
 from lightning.fabric.utilities.apply_func import move_data_to_device
 
-from csm.descriptors import Coordinates
+from csm.descriptors import ACD, Coordinates
 from csm.descriptors.base import record
 from csm.errors import ConfigError
 from csm.learning.loading import LightningData
 from csm.learning.module import CSMModule, Standardisation, random_rotation
-from csm.learning.samples import NetworkInput, stencils_for
+from csm.learning.samples import NetworkInput, also_classes, stencils_for
 from csm.matching.nearest import nearest
 from csm.networks import NETWORKS
 from tests.learning.toys import make, train
@@ -188,3 +188,39 @@ def test_a_training_step_never_waits_for_the_device(of_all_networks, name):
     assert sample.features.device.type == sample.surface.basis.evecs.device.type == "meta"
     module.training_step(sample).backward()
     assert module.network.classifier.weight.grad.device.type == "meta"
+
+
+def test_the_input_is_varied_in_training_only_and_only_where_it_is_standardised(loaded):
+    module, sample = make(loaded, standardise=True, vary=0.3), next(iter(loaded.val_dataloader()))
+    module.eval()
+    still = module(sample.features, sample.surface)
+    torch.testing.assert_close(module(sample.features, sample.surface), still)
+    module.train()
+    assert not torch.allclose(module(sample.features, sample.surface), still)
+    with pytest.raises(ConfigError, match=r"set learning\.standardise=true"):
+        make(loaded, vary=0.3)
+
+
+def test_places_are_what_a_network_describes_by(loaded):
+    module, sample = make(loaded, places=16), loaded.sample(loaded.data.fit_names[0])
+    module.places.learn(sample)
+    found = module.describe(given(sample))
+    last = module.last_layer(given(sample))
+    torch.testing.assert_close(found, module.places(last, module.network.classifier))
+    assert found.shape == (162, 16)
+    with pytest.raises(ConfigError, match="the data hold 24 eigenfunctions"):
+        make(loaded, places=25)
+
+
+def test_half_of_the_steps_see_a_mirror_image_whose_labels_have_a_classifier_of_their_own(loaded, tmp_path):
+    module = make(loaded, mirror=0.5, also_classes=also_classes(loaded.data, mirror=True))
+    assert module.hparams["also_classes"] == {"mirrored": 162}
+    sample = loaded.sample(loaded.data.fit_names[0])
+    seen = [module._seen(sample) for _ in range(200)]
+    images = [each for each in seen if each.template == "mirrored"]
+    assert 60 < len(images) < 140
+    order = ACD(angles=4, k=8, order=3, cuts=1).mirrored_columns()
+    assert torch.equal(images[0].features, sample.features[:, order])
+    before = module.others["mirrored"].weight.detach().clone()
+    train(module, loaded, tmp_path, 2)
+    assert not torch.equal(module.others["mirrored"].weight, before)

@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+import pytest
+import torch
+from torch import nn
+
+from csm.data.prepare import Recipe, prepare_mesh
+from csm.data.shapes import Shape
+from csm.data.store import Store
+from csm.descriptors import HKS
+from csm.learning.places import Places
+from csm.learning.samples import shape_sample
+from csm.mesh.correspondence import PointMap
+from tests.shapes import blob
+
+
+@pytest.fixture
+def sample(tmp_path):
+    prepared = prepare_mesh(blob(), Recipe(HKS(k=20), 12), Store(tmp_path))
+    return shape_sample(prepared, Shape(prepared.mesh, PointMap.identity(162)))
+
+
+def test_a_place_is_the_mean_of_the_eigenfunctions_over_the_probable_points(sample):
+    places, classifier = Places(162, 8), nn.Linear(5, 162)
+    places.learn(sample)
+    last = torch.randn(30, 5)
+    p = torch.softmax(last.double() @ classifier.weight.double().T + classifier.bias.double(), 1)
+    mean = torch.stack([sum(p[x, c] * places.functions[c].double() for c in range(162)) for x in range(30)])
+    wanted = mean / mean.norm(dim=1, keepdim=True)
+    torch.testing.assert_close(places(last, classifier, block=7).double(), wanted, atol=1e-5, rtol=1e-4)
+
+
+def test_a_vertex_that_is_surely_a_point_has_its_row(sample):
+    places, classifier = Places(162, 8), nn.Linear(162, 162)
+    places.learn(sample)
+    with torch.no_grad():
+        classifier.weight.copy_(1e4 * torch.eye(162))
+    found = places(torch.eye(162), classifier)
+    rows = sample.surface.basis.evecs[:162, :8]
+    torch.testing.assert_close(found, rows / rows.norm(dim=1, keepdim=True))
+
+
+def test_points_that_a_shape_lacks_do_not_count(sample):
+    places = Places(200, 8)
+    places.learn(sample._replace(rows=sample.rows[:100], classes=sample.classes[:100]))
+    assert places.functions[:100].abs().sum(1).min() > 0
+    assert places.functions[100:].abs().max() == 0
+
+
+def test_more_eigenfunctions_than_there_are_is_an_error(sample):
+    with pytest.raises(ValueError, match="wanted 13 eigenfunctions of the template, and the data hold 12"):
+        Places(162, 13).learn(sample)
+    with pytest.raises(ValueError, match="2 or more"):
+        Places(162, 1)
