@@ -6,10 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from csm._places import load
+from csm.data.registry import data_set, find_set
 from csm.data.shapes import ShapeSet
 from csm.data.store import Store
 from csm.data.variants import Variant, VariantSet
 from csm.errors import ConfigError
+
+_PUBLISHED = ("faust", "scape")
+"""Data sets whose shapes can be added: those that have a split."""
 
 _HUMANS = "humans"  # the template of the built-in humans and of bodies
 
@@ -52,7 +56,8 @@ def additional(text: str, train_set: ShapeSet, names: Sequence[str], store: Stor
     text
         "remeshed_N" or "refined_N": the training shapes with N vertices and other triangles, or finer; "humans",
         "humans_remeshed_N", "humans_refined_N": the training persons of the built-in humans; the path of a file that
-        ``csm bodies`` has written, "FILE.npz", also with other triangles, "FILE.npz:remeshed_N".
+        ``csm bodies`` has written, "FILE.npz", also with other triangles, "FILE.npz:remeshed_N"; a set in the folder
+        `CSM_DATA`, such as "FAUST_6890": the training shapes of its first split.
     train_set, names
         The training set, and its shapes that are fitted.
     store
@@ -62,6 +67,8 @@ def additional(text: str, train_set: ShapeSet, names: Sequence[str], store: Stor
     ------
     ConfigError
         If the name has another form.
+    DataError
+        If there is no such file or set.
     """
     template = "" if getattr(train_set, "built_in", False) else _HUMANS
     file, colon, other = text.rpartition(":")
@@ -76,10 +83,15 @@ def additional(text: str, train_set: ShapeSet, names: Sequence[str], store: Stor
         return Additional(shapes, load("csm.data.humans:SPLITS")[0].train, template)
     if _variant(text):
         return Additional(_with_triangles(train_set, text, store), tuple(names))
+    for name in _PUBLISHED:
+        if text.lower().startswith(f"{name}_"):
+            shapes, split = find_set(None, text), data_set(name).splits[0]
+            split.require(shapes.names, shapes.name, "train")
+            return Additional(shapes, split.train, text)
     raise ConfigError(
         f"data.also: {text!r} is no set that can be added; wanted remeshed_N or refined_N, with N vertices, humans, "
-        "humans_remeshed_N or humans_refined_N, or a file of bodies, FILE.npz, FILE.npz:remeshed_N or "
-        "FILE.npz:refined_N"
+        "humans_remeshed_N or humans_refined_N, a file of bodies, FILE.npz, FILE.npz:remeshed_N or FILE.npz:refined_N, "
+        "or a set in the folder CSM_DATA, such as FAUST_6890"
     )
 
 

@@ -8,7 +8,7 @@ from csm.data.registry import recognise
 from csm.data.splits import Split
 from csm.data.store import Store
 from csm.descriptors import HKS
-from csm.errors import ConfigError
+from csm.errors import ConfigError, DataError
 from tests.toyset import write_toys
 
 SPLIT = Split("mine", ("toy0", "toy1"), ("toy4", "toy5"))
@@ -31,6 +31,19 @@ def test_the_same_shapes_share_a_template_and_humans_have_their_own(toys, tmp_pa
 def test_an_unknown_name_is_answered_with_the_forms(toys, tmp_path, text):
     with pytest.raises(ConfigError, match=r"data.also: .* wanted remeshed_N"):
         additional(text, toys, SPLIT.train, Store(tmp_path))
+
+
+@pytest.mark.data
+def test_a_set_of_the_data_folder_has_a_template_of_its_own(data_set, toys, tmp_path, monkeypatch):
+    monkeypatch.setenv("CSM_DATA", str(data_set("SCAPE_5000").parent))
+    more = additional("SCAPE_5000", toys, SPLIT.train, Store(tmp_path))
+    assert (more.template, len(more.names)) == ("SCAPE_5000", 51)
+
+
+def test_a_set_that_is_not_in_the_data_folder_is_named(toys, tmp_path, monkeypatch):
+    monkeypatch.setenv("CSM_DATA", str(tmp_path))
+    with pytest.raises(DataError, match="wanted FAUST_6890, but no published set"):
+        additional("FAUST_6890", toys, SPLIT.train, Store(tmp_path))
 
 
 def test_a_data_module_prepares_and_names_them(toys, tmp_path):
