@@ -115,7 +115,7 @@ class LightningData(L.LightningDataModule):
     def sample(self, name: str) -> ShapeSample:
         """Return the tensors of a training shape; they are made once and stay in memory."""
         if name not in self._samples:
-            self._samples[name] = shape_sample(self.data.prepared(name), self.data.shape(name))
+            self._samples[name] = shape_sample(self.data.prepared(name), self.data.shape(name).truth)
         return self._samples[name]
 
     @property
@@ -134,7 +134,7 @@ class LightningData(L.LightningDataModule):
         if key in self._kept:
             return self._kept[key]
         shape = more.shapes.load(name)
-        sample = shape_sample(prepare_mesh(shape.mesh, self.data.recipe, self.data.store), shape, more.template)
+        sample = shape_sample(prepare_mesh(shape.mesh, self.data.recipe, self.data.store), shape.truth, more.template)
         if self._room >= (size := n_bytes(sample)):
             self._room -= size
             self._kept[key] = sample

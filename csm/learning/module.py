@@ -17,7 +17,7 @@ from csm.descriptors.presets import from_parameters
 from csm.errors import ConfigError
 from csm.learning.loss import Products, linear_cross_entropy
 from csm.learning.places import Places
-from csm.learning.samples import NetworkInput, ShapeSample
+from csm.learning.samples import NetworkInput, ShapeSample, mirrored_template
 from csm.learning.variation import Variation
 from csm.networks import Surface, build
 
@@ -66,7 +66,9 @@ class CSMModule(L.LightningModule):
         (`Variation`); 0 for not at all.
     mirror
         Share of training steps that see the mirror image of their shape, whose input is that of the shape with its
-        columns in another order (`csm.descriptors.base.Descriptor.mirrored_columns`).
+        columns in another order (`csm.descriptors.base.Descriptor.mirrored_columns`), so that left and right are told
+        apart on bodies that it has not seen.  `also_classes` must have the mirrored templates then
+        (`csm.learning.samples.also_classes`).
     places
         Describe a vertex by where on the template the classifier sees it, in this many of the template's
         eigenfunctions (`Places`); 0: by the network's last layer.
@@ -194,10 +196,11 @@ class CSMModule(L.LightningModule):
         return loss
 
     def _seen(self, sample: ShapeSample) -> ShapeSample:
-        """Return the shape or its mirror image."""
-        if not self.mirror or sample.mirrored is None or torch.rand(()).item() >= self.mirror:
+        """Return the shape or its mirror image, whose points are those of a template of its own."""
+        if not self.mirror or torch.rand(()).item() >= self.mirror:
             return sample
-        return sample._replace(features=sample.features[:, self.image_columns], **sample.mirrored._asdict())
+        image = sample.features[:, self.image_columns]
+        return sample._replace(features=image, template=mirrored_template(sample.template))
 
     def validation_step(self, sample: ShapeSample) -> Tensor:
         """Return the learned descriptor of one shape; the loss is logged, the errors are a callback's business."""

@@ -12,7 +12,6 @@ from torch import Tensor
 from csm._types import Arrays
 from csm.data.base import DataModule
 from csm.data.prepare import Prepared, Recipe
-from csm.data.shapes import Shape
 from csm.descriptors.presets import from_parameters
 from csm.errors import ConfigError
 from csm.mesh.correspondence import PointMap
@@ -32,23 +31,12 @@ class NetworkInput(NamedTuple):
         return NetworkInput(self.features.to(device), self.surface.to(device))
 
 
-class Labels(NamedTuple):
-    """What is known of a shape: the vertices `rows`, shape (R,), are the points `classes`, shape (R,), of a template.
-
-    The `template` has no name if it is that of the training set.
-    """
-
-    rows: Tensor
-    classes: Tensor
-    template: str = ""
-
-
 class ShapeSample(NamedTuple):
     """One training shape.
 
     Shapes: `features` (N, P); `surface` with K eigenpairs; `rows` (R,) vertices with a known template point and
     `classes` (R,) that point of the `template`, which has no name if it is that of the training set.  `counts` is its
-    weight in the loss of a validation.  `mirrored` are the labels of the mirror image.
+    weight in the loss of a validation.
     """
 
     name: str
@@ -58,7 +46,6 @@ class ShapeSample(NamedTuple):
     classes: Tensor
     template: str = ""
     counts: int = 1
-    mirrored: Labels | None = None
 
 
 def network_input(prepared: Prepared) -> NetworkInput:
@@ -71,25 +58,15 @@ def network_input(prepared: Prepared) -> NetworkInput:
     return NetworkInput(torch.as_tensor(prepared.features), Surface(basis, stencils))
 
 
-def shape_sample(prepared: Prepared, shape: Shape, template: str = "") -> ShapeSample:
-    """Convert a prepared shape with its map from a template to a training sample.
-
-    Its mirror image has the labels of the shape's mirror map.  Where none is known the points of the mirrored template
-    are those of a template of their own, whose name is `mirrored_template`.
-    """
-    rows, classes, _ = labels = _labels(shape.truth, template)
-    known = shape.mirror
-    image = labels._replace(template=mirrored_template(template)) if known is None else _labels(known, template)
-    return ShapeSample(prepared.mesh.name, *network_input(prepared), rows, classes, template, mirrored=image)
-
-
-def _labels(truth: PointMap, template: str) -> Labels:
+def shape_sample(prepared: Prepared, truth: PointMap, template: str = "") -> ShapeSample:
+    """Convert a prepared mesh and its map from a template to a training sample."""
     classes = np.flatnonzero(truth.indices >= 0)
-    return Labels(torch.as_tensor(truth.indices[classes]), torch.as_tensor(classes), template)
+    rows = torch.as_tensor(truth.indices[classes])
+    return ShapeSample(prepared.mesh.name, *network_input(prepared), rows, torch.as_tensor(classes), template)
 
 
 def mirrored_template(template: str) -> str:
-    """Return the name of the mirror image of a template of which no left-right map is known.
+    """Return the name of the mirror image of a template.
 
     Examples
     --------
@@ -102,12 +79,12 @@ def mirrored_template(template: str) -> str:
 def also_classes(data: DataModule, mirror: bool) -> dict[str, int]:
     """Return the number of points of each template that needs a classifier beside that of the training set, by name.
 
-    With `mirror` these are also the mirror images of templates whose left-right map is not known.
+    With `mirror` the mirror images of all templates are among them: as the left-right map of a template is not always
+    known, the points of its mirror image are learned as those of another template.
     """
     found = data.also_classes
     if mirror:
-        sets = [("", data.shape(data.fit_names[0])), *((m.template, m.shapes.load(m.names[0])) for m in data.also)]
-        found |= {mirrored_template(name): shape.truth.n_from for name, shape in sets if shape.mirror is None}
+        found |= {mirrored_template(name): n for name, n in {"": data.n_classes, **found}.items()}
     return found
 
 

@@ -16,7 +16,6 @@ from csm._peak import peak_megabytes
 from csm._progress import progress_bar
 from csm._types import Arrays
 from csm.data.prepare import prepare_mesh
-from csm.data.shapes import Shape
 from csm.data.store import Store
 from csm.descriptors.base import record
 from csm.descriptors.presets import preset
@@ -147,7 +146,7 @@ def _measure(hparams: Mapping[str, Any], mesh: Mesh, root: str, threads: int, re
     torch.set_num_threads(threads)
     torch.manual_seed(0)
     prepared = prepare_mesh(mesh, recipe_of(hparams), Store(root))
-    sample = shape_sample(prepared, Shape(mesh, PointMap.identity(mesh.n_vertices)))
+    sample = shape_sample(prepared, PointMap.identity(mesh.n_vertices))
     given = NetworkInput(sample.features, sample.surface)
     before = peak_megabytes()
     module = CSMModule(in_channels=sample.features.shape[1], n_classes=mesh.n_vertices, **hparams)

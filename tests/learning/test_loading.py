@@ -93,7 +93,7 @@ def test_faust_trains_on_one_resolution_and_tests_on_others(data_set, tmp_path):
 @pytest.mark.data
 def test_scape_classes_reach_vertices_through_labels(data_set, tmp_path):
     data = ScapeDataModule(data_set("SCAPE_5000"), store=Store(tmp_path), **CHEAP)
-    sample = shape_sample(data.prepared("mesh000"), data.shape("mesh000"))
+    sample = shape_sample(data.prepared("mesh000"), data.shape("mesh000").truth)
     assert len(sample.classes) == 5000
     assert len(torch.unique(sample.rows)) < 5000
     assert sample.rows.max() < len(sample.features)

@@ -5,7 +5,6 @@ import torch
 from torch import nn
 
 from csm.data.prepare import Recipe, prepare_mesh
-from csm.data.shapes import Shape
 from csm.data.store import Store
 from csm.descriptors import HKS
 from csm.learning.places import Places
@@ -17,7 +16,7 @@ from tests.shapes import blob
 @pytest.fixture
 def sample(tmp_path):
     prepared = prepare_mesh(blob(), Recipe(HKS(k=20), 12), Store(tmp_path))
-    return shape_sample(prepared, Shape(prepared.mesh, PointMap.identity(162)))
+    return shape_sample(prepared, PointMap.identity(162))
 
 
 def test_a_place_is_the_mean_of_the_eigenfunctions_over_the_probable_points(sample):

@@ -10,13 +10,12 @@ from scipy.spatial.transform import Rotation
 
 from csm._types import Arrays
 from csm.data.prepare import Recipe, prepare_mesh
-from csm.data.shapes import Shape
 from csm.data.store import Store
 from csm.descriptors import HKS
 from csm.descriptors.base import record
 from csm.errors import ConfigError
 from csm.learning.module import CSMModule
-from csm.learning.samples import mirrored_template, network_input, recipe_of, shape_sample, stencils_for
+from csm.learning.samples import network_input, recipe_of, shape_sample, stencils_for
 from csm.matching.nearest import nearest
 from csm.mesh.correspondence import Direction, PointMap
 from csm.mesh.shape import Mesh
@@ -78,21 +77,11 @@ def test_classes_without_a_vertex_are_left_out_and_labels_may_repeat(tmp_path):
     truth = np.arange(162)
     truth[[3, 5]] = [-1, 4]
     prepared = prepare_mesh(blob(2), Recipe(HKS(k=20, n_times=5), 8), Store(tmp_path))
-    sample = shape_sample(prepared, Shape(prepared.mesh, PointMap(truth, Direction.TEMPLATE_TO_SHAPE, 162)))
+    sample = shape_sample(prepared, PointMap(truth, Direction.TEMPLATE_TO_SHAPE, 162))
     assert sample.name == "blob"
     assert 3 not in sample.classes
     assert sample.rows[sample.classes == 5].item() == 4
     assert len(sample.rows) == 161
-
-
-def test_the_mirror_image_has_the_labels_of_the_mirror_map_or_a_template_of_its_own(tmp_path):
-    prepared = prepare_mesh(blob(), Recipe(HKS(k=20), 12), Store(tmp_path))
-    truth = PointMap.identity(162)
-    turned = PointMap(np.arange(162)[::-1].copy(), Direction.TEMPLATE_TO_SHAPE, 162)
-    known = shape_sample(prepared, Shape(prepared.mesh, truth, turned), "people").mirrored
-    assert (known.template, known.rows[3], known.classes[3]) == ("people", 158, 3)
-    unknown = shape_sample(prepared, Shape(prepared.mesh, truth), "people").mirrored
-    assert (unknown.template, unknown.rows[3], unknown.classes[3]) == (mirrored_template("people"), 3, 3)
 
 
 def test_a_network_brings_what_it_wants_to_have_prepared():
