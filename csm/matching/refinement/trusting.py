@@ -3,6 +3,7 @@
 A network that knows the shapes gives a map that no search improves, and a search may leave it for a wrong one.  On
 shapes that it does not know it exchanges limbs as a descriptor does, and only a search mends that.  Which of the two it
 is shows without ground truth: where nearest neighbours are right they return to their place on the way there and back.
+In a start that is trusted, those that do so keep their partners (`csm.matching.refinement.anchors`).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from csm.errors import ConfigError
 from csm.matching.base import Described
 from csm.matching.confidence import share_returning
 from csm.matching.maps import VertexMap
+from csm.matching.refinement.anchors import anchored
 from csm.matching.refinement.base import RefinedMap, Refiner
 from csm.matching.refinement.joint import Joint
 from csm.matching.refinement.multistart import Multistart
@@ -59,6 +61,8 @@ class Trusting(Refiner):
         share = returning(source, target)
         trusted = share >= self.returning
         done = (self.joint if trusted else self.search)(start, source, target)
+        if trusted:
+            done = anchored(done, source, target)
         said = f"{100 * share:.0f} % of the descriptor's nearest neighbours return to their place, so the start was "
         return replace(done, text=f"{said}{'kept' if trusted else 'searched for'}: {done.text}")
 

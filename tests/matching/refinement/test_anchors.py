@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from csm.matching.barycentric import BarycentricMap
+from csm.matching.base import Described
+from csm.matching.maps import VertexMap
+from csm.matching.refinement.anchors import FAR, anchored
+from csm.matching.refinement.base import RefinedMap
+from csm.matching.way import Way
+from tests.shapes import blob
+
+MESH = blob(2)
+SAME = Described(MESH, torch.tensor(MESH.vertices))
+AWAY = np.argmax(np.linalg.norm(MESH.vertices[:, None] - MESH.vertices, axis=2), axis=1)  # the farthest vertex of each
+
+
+def way(indices) -> Way:
+    found = VertexMap(indices, 162)
+    return Way(found, precise=lambda: BarycentricMap.of_vertices(found, MESH.faces))
+
+
+def test_partners_that_return_come_back_where_a_refinement_took_them_far_away():
+    indices = np.arange(162)
+    indices[:20] = AWAY[:20]
+    found = anchored(RefinedMap(way(indices), way(indices), "done"), SAME, SAME)
+    for each in (found.forward, found.backward):
+        np.testing.assert_array_equal(each.vertex_map.indices, np.arange(162))
+        np.testing.assert_array_equal(each.barycentric.vertex_map().indices, np.arange(162))
+    assert found.text == "done"
+
+
+def test_small_steps_of_a_refinement_stay():
+    apart = np.linalg.norm(MESH.vertices[:, None] - MESH.vertices, axis=2) / np.sqrt(MESH.area) + 9 * np.eye(162)
+    near = apart.argmin(1)
+    assert apart.min(1).max() < FAR
+    start = way(near)
+    assert anchored(RefinedMap(start), SAME, SAME).forward is start
+
+
+def test_partners_that_do_not_return_are_the_business_of_the_refinement():
+    features = SAME.features.clone()
+    features[0] = features[AWAY[0]] + 0.01  # the descriptor sees this vertex elsewhere, and no way leads back
+    indices = np.arange(162)
+    found = anchored(RefinedMap(way(indices)), Described(MESH, features), SAME)
+    np.testing.assert_array_equal(found.forward.vertex_map.indices, indices)
+
+
+@pytest.mark.parametrize("backward", [True, False])
+def test_a_refinement_without_a_way_back_keeps_none(backward):
+    done = RefinedMap(way(np.arange(162)), way(np.arange(162)) if backward else None)
+    assert (anchored(done, SAME, SAME).backward is not None) == backward
