@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from csm import __version__
 from csm._types import Arrays
 from csm.errors import DataError
 from csm.mesh.io import atomic_path
@@ -225,4 +226,4 @@ def _announced(content: io.BytesIO) -> int:
 @cache
 def _versions() -> dict[str, str]:
     """Return the versions of what entries are computed with; asking the installation takes 5 ms each."""
-    return {name: version(name) for name in ("csm", "numpy", "scipy")}
+    return {"csm": __version__, **{name: version(name) for name in ("numpy", "scipy")}}

@@ -11,6 +11,7 @@ from typing import Any
 import torch
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
+from torch import Tensor
 
 from csm.errors import ConfigError, CsmError, DataError
 from csm.learning.module import CSMModule
@@ -19,7 +20,7 @@ from csm.mesh.io import atomic_path, read_bytes
 WEIGHTS, SETTINGS = "model.safetensors", "model.json"
 
 
-def export_module(module: CSMModule, folder: Path, *, classifier: bool = False) -> Path:
+def export_module(module: CSMModule, folder: Path, *, classifier: bool = False, half: bool = False) -> Path:
     """Write a trained network to ``model.safetensors`` and its hyper-parameters to ``model.json``.
 
     Parameters
@@ -29,8 +30,10 @@ def export_module(module: CSMModule, folder: Path, *, classifier: bool = False) 
     folder
         Where the two files go; it is made if needed.
     classifier
-        Also keep the classifier over the template vertices. Matching does not need it, and it is nine tenths of the
-        weights.
+        Also keep the classifier over the template vertices.  Matching needs it where the network describes by places
+        (it is kept then in any case), and it is nine tenths of the weights.
+    half
+        Write the network's weights in half precision.
 
     Returns
     -------
@@ -38,7 +41,7 @@ def export_module(module: CSMModule, folder: Path, *, classifier: bool = False) 
         The json file, which `load_module` and ``checkpoint=`` of the commands take.
     """
     weights = {
-        name: tensor.detach().cpu().contiguous()
+        name: _written(name, tensor, half)
         for name, tensor in module.weights().items()
         if classifier or module.places is not None or not name.startswith("classifier.")
     }
@@ -47,6 +50,11 @@ def export_module(module: CSMModule, folder: Path, *, classifier: bool = False) 
     with atomic_path(folder / SETTINGS) as temporary:
         temporary.write_text(json.dumps(dict(module.hparams), indent=1) + "\n")
     return folder / SETTINGS
+
+
+def _written(name: str, tensor: Tensor, half: bool) -> Tensor:
+    plain = tensor.detach().cpu().contiguous()
+    return plain.half() if half and plain.is_floating_point() and not name.startswith("inputs.") else plain
 
 
 def load_module(path: str | os.PathLike[str]) -> CSMModule:

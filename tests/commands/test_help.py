@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import pytest
 
 from csm.commands.help import help_text, read_page
@@ -31,3 +34,8 @@ def test_words_without_a_key_are_in_the_usage():
 
 def test_no_line_is_wider_than_a_terminal():
     assert max(len(line) for command in COMMANDS for line in help_text(command).splitlines()) <= 120
+
+
+def test_the_program_is_also_a_module():
+    words = [sys.executable, "-m", "csm", "--help"]
+    assert subprocess.run(words, capture_output=True, text=True, check=True).stdout.startswith("csm ")

@@ -129,7 +129,7 @@ def test_wrong_parameters_are_refused(wrong):
 def test_a_graphics_card_gives_the_same_map(store):
     found = known(store)
     made = Multistart()(found.start, found.source, found.target).forward.vertex_map.indices
-    source, target = (replace(each, features=each.features.cuda()) for each in (found.source, found.target))
+    source, target = (replace(each, rows=each.features.cuda()) for each in (found.source, found.target))
     assert source.embedded.evecs.is_cuda
     assert (Multistart()(found.start, source, target).forward.vertex_map.indices == made).mean() > 0.98
 

@@ -1,0 +1,68 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from csm.errors import ConfigError
+from csm.learning.checkpoint import export_module, load_module
+from csm.learning.loading import LightningData
+from csm.learning.samples import NetworkInput, also_classes
+from csm.learning.thinning import thinned
+from tests.learning.toys import make
+from tests.toyset import toy_datamodule
+
+
+@pytest.fixture(scope="module")
+def loaded(tmp_path_factory):
+    made = LightningData(toy_datamodule(tmp_path_factory.mktemp("thin")))
+    made.prepare_data()
+    return made
+
+
+@pytest.fixture(scope="module")
+def module(loaded):
+    made = make(loaded, places=16, mirror=0.5, also_classes=also_classes(loaded.data, mirror=True), standardise=True)
+    made.places.learn(loaded.sample(loaded.data.fit_names[0]))
+    return made
+
+
+def described(network, loaded):
+    sample = loaded.sample(loaded.data.fit_names[1])
+    return network.describe(NetworkInput(sample.features, sample.surface))
+
+
+def test_all_points_and_functions_give_the_same_descriptor(module, loaded):
+    same = thinned(module, np.arange(162), 16)
+    torch.testing.assert_close(described(same, loaded), described(module, loaded))
+    assert not same.others
+
+
+def test_some_points_share_the_probability(module, loaded):
+    kept = np.arange(0, 162, 3)
+    sample = loaded.sample(loaded.data.fit_names[1])
+    last = module.last_layer(NetworkInput(sample.features, sample.surface))
+    p = torch.softmax(module.network.classifier(last)[:, kept], 1) @ module.places.functions[kept, :5]
+    found = described(thinned(module, kept, 5), loaded)
+    torch.testing.assert_close(found, p / p.norm(dim=1, keepdim=True), atol=1e-5, rtol=1e-4)
+
+
+def test_half_precision_changes_little_and_halves_the_file(module, loaded, tmp_path):
+    small = thinned(module, np.arange(0, 162, 2), 8)
+    sizes = {}
+    for half in (False, True):
+        made = load_module(export_module(small, tmp_path / str(half), half=half))
+        torch.testing.assert_close(described(made, loaded), described(small, loaded), atol=1e-2, rtol=0)
+        sizes[half] = (tmp_path / str(half) / "model.safetensors").stat().st_size
+    assert sizes[True] < 0.65 * sizes[False]
+
+
+@pytest.mark.parametrize(("classes", "functions"), [([0, 162], 8), ([], 8), ([1, 2], 17), ([1, 2], 1)])
+def test_what_is_not_there_cannot_be_kept(module, classes, functions):
+    with pytest.raises(ConfigError, match="wanted some of 162 points"):
+        thinned(module, np.array(classes, dtype=np.int64), functions)
+
+
+def test_a_network_that_describes_by_its_last_layer_needs_all_points(loaded):
+    with pytest.raises(ConfigError, match=r"trained with learning\.places"):
+        thinned(make(loaded), np.arange(9), 4)
