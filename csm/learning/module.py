@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any, Literal
 
 import lightning as L
@@ -13,12 +12,12 @@ from torch.optim import Adam
 from torch.optim.lr_scheduler import CosineAnnealingLR, LRScheduler, OneCycleLR, StepLR
 
 from csm.descriptors import Coordinates
-from csm.descriptors.presets import from_parameters
 from csm.errors import ConfigError
 from csm.learning.loss import Products, linear_cross_entropy
 from csm.learning.places import Places
 from csm.learning.samples import NetworkInput, ShapeSample, mirrored_template
-from csm.learning.variation import Variation
+from csm.learning.standardisation import Standardisation
+from csm.learning.variation import Variation, image_columns
 from csm.networks import Surface, build
 
 Schedule = Literal["constant", "cosine", "step", "drop", "one_cycle"]
@@ -121,8 +120,7 @@ class CSMModule(L.LightningModule):
         self.inputs = Standardisation(in_channels) if standardise else None
         self.variation = self._variation(vary, standardise)
         self.mirror = mirror
-        columns = torch.from_numpy(from_parameters(**descriptor).mirrored_columns()) if mirror else torch.zeros(0)
-        self.register_buffer("image_columns", columns, persistent=False)
+        self.register_buffer("image_columns", image_columns(mirror, descriptor), persistent=False)
         self.places = self._places(n_classes, places, basis_k)
         width = self.network.classifier.in_features
         self.others = nn.ModuleDict({name: nn.Linear(width, n) for name, n in (also_classes or {}).items()})
@@ -243,39 +241,6 @@ class CSMModule(L.LightningModule):
             case "one_cycle":
                 return OneCycleLR(optimizer, self.lr, total_steps=steps + 1)  # it is stepped once after the last step
         raise ConfigError(f"schedule is constant, cosine, step, drop or one_cycle, got {self.schedule!r}")
-
-
-class Standardisation(nn.Module):
-    """Columns of the input with mean 0 and deviation 1 over the training shapes.
-
-    Parameters
-    ----------
-    columns
-        Width P of the input.
-    limit
-        Deviations from the mean at which a value is cut: a sliver's must not drown the others.
-    """
-
-    mean: Tensor
-    deviation: Tensor
-
-    def __init__(self, columns: int, limit: float = 10.0) -> None:
-        super().__init__()
-        self.limit = limit
-        self.register_buffer("mean", torch.zeros(columns))
-        self.register_buffer("deviation", torch.ones(columns))
-
-    def learn(self, shapes: Iterable[Tensor]) -> None:
-        """Take means and deviations over shapes, each of shape (N, P), which count alike whatever their N."""
-        moments = [torch.stack([x.double().mean(0), x.double().square().mean(0)]) for x in shapes]
-        mean, square = torch.stack(moments).mean(0)
-        deviation = (square - mean.square()).clamp(min=0).sqrt()
-        self.mean.copy_(mean)
-        self.deviation.copy_(torch.where(deviation > 1e-7 * mean.abs(), deviation, 1.0))  # a constant column stays 0
-
-    def forward(self, x: Tensor) -> Tensor:
-        """Return the input, shape (N, P), standardised and cut."""
-        return ((x - self.mean) / self.deviation).clamp(-self.limit, self.limit)
 
 
 def random_rotation() -> Tensor:

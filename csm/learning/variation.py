@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import torch
 from torch import Tensor, nn
 
+from csm.descriptors.presets import from_parameters
 from csm.errors import ConfigError
 
 
@@ -43,3 +47,33 @@ class Variation(nn.Module):
         scale, shift = self.spread * torch.randn(2, x.shape[1], device=x.device, dtype=x.dtype)
         varied: Tensor = x * scale.exp() + shift
         return varied
+
+
+def image_columns(mirror: float, descriptor: Mapping[str, Any]) -> Tensor:
+    """Return which column of the input is which of a mirror image, shape (P,); of length 0 if no step sees one.
+
+    Parameters
+    ----------
+    mirror
+        Share of the steps that see one.
+    descriptor
+        Name and parameters of the input.
+
+    Raises
+    ------
+    ConfigError
+        If the share is none, or it is not known how the descriptor's columns change.
+
+    Examples
+    --------
+    >>> image_columns(0.5, {"name": "acd", "angles": 3, "k": 5, "cuts": 1, "order": 1}).tolist()
+    [0, 1, 4, 5, 2, 3]
+    """
+    if not 0 <= mirror <= 1:
+        raise ConfigError(f"learning.mirror={mirror}; wanted a share of the steps from 0 to 1")
+    if not mirror:
+        return torch.zeros(0, dtype=torch.int64)
+    try:
+        return torch.as_tensor(from_parameters(**descriptor).mirrored_columns(), device="cpu")
+    except ConfigError as error:
+        raise ConfigError(f"learning.mirror={mirror}: {error}; set learning.mirror=0") from error

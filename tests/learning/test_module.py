@@ -12,7 +12,7 @@ from csm.descriptors import ACD, Coordinates
 from csm.descriptors.base import record
 from csm.errors import ConfigError
 from csm.learning.loading import LightningData
-from csm.learning.module import CSMModule, Standardisation, random_rotation
+from csm.learning.module import CSMModule, random_rotation
 from csm.learning.samples import NetworkInput, also_classes, stencils_for
 from csm.matching.nearest import nearest
 from csm.networks import NETWORKS
@@ -125,17 +125,6 @@ def test_the_same_seed_gives_the_same_network(loaded, tmp_path):
     torch.testing.assert_close(*weights)
 
 
-def test_standardised_inputs_have_mean_zero_and_deviation_one_over_the_shapes_whatever_their_sizes():
-    shapes = [torch.randn(n, 3) * torch.tensor([1.0, 50.0, 0.0]) + torch.tensor([5.0, 0.0, 7.0]) for n in (40, 4000)]
-    inputs = Standardisation(3)
-    inputs.learn(shapes)
-    moments = torch.stack([inputs(x).mean(0) for x in shapes]).mean(0)
-    spread = torch.stack([inputs(x).square().mean(0) for x in shapes]).mean(0)
-    torch.testing.assert_close(moments, torch.zeros(3), atol=1e-3, rtol=0)
-    torch.testing.assert_close(spread, torch.tensor([1.0, 1.0, 0.0]), atol=1e-3, rtol=0)
-    assert inputs(torch.full((1, 3), 1e9)).max() == 10
-
-
 def test_shapes_of_another_template_train_the_same_descriptor_through_a_classifier_of_their_own(loaded, tmp_path):
     module = make(loaded, also_classes={"others": 50})
     sample = next(iter(loaded.val_dataloader()))._replace(template="others")
@@ -224,3 +213,16 @@ def test_half_of_the_steps_see_a_mirror_image_whose_labels_have_a_classifier_of_
     before = module.others["mirrored"].weight.detach().clone()
     train(module, loaded, tmp_path, 2)
     assert not torch.equal(module.others["mirrored"].weight, before)
+
+
+@pytest.mark.parametrize(
+    ("mirror", "descriptor", "message"),
+    [
+        (0.5, record(Coordinates()), r"xyz: it is not known how its columns change .*; set learning\.mirror=0"),
+        (1.5, record(ACD(angles=4, k=8)), r"mirror=1\.5; wanted a share of the steps from 0 to 1"),
+        (float("nan"), record(ACD(angles=4, k=8)), "wanted a share of the steps"),
+    ],
+)
+def test_what_cannot_be_mirrored_is_an_error(mirror, descriptor, message):
+    with pytest.raises(ConfigError, match=message):
+        CSMModule({"name": "mlp"}, 3, 5, descriptor, mirror=mirror)
