@@ -24,6 +24,7 @@ from csm.descriptors.presets import PRESETS
 from csm.errors import ConfigError
 from csm.matching import DescriptorMethod, Method, match_meshes
 from csm.matching.shipped import shipped_models
+from csm.matching.suited import AUTO
 from csm.mesh.io.owned import require_not_input, require_own
 from csm.viewer.match_folder import ACCOUNT, FILES, made_by, write_match
 
@@ -35,6 +36,8 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     if cfg.folder is not None:
         from csm.commands.collection import run_collection
 
+        if cfg.model == AUTO:
+            raise ConfigError("model=auto chooses for two meshes; with folder= say model=humans, or leave it out")
         return run_collection(cfg, *_method(cfg))
     if None in (cfg.source, cfg.target):
         raise ConfigError("match needs two meshes: csm match SOURCE TARGET [OUT], or a folder of them: folder=DIR")
@@ -48,13 +51,14 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     match = match_meshes(
         cfg.source,
         cfg.target,
-        method,
+        AUTO if cfg.model == AUTO else method,
         cfg.matching,
         cfg.refine,
         clean=cfg.clean,
         store=Store(cfg.store),
         device=cfg.device,
     )
+    text = text if match.method is method else _called(match.method)
     write_match(match, folder, text, time.perf_counter() - begun)
     for note in match.notes:
         print(f"note: {note}")
@@ -84,22 +88,29 @@ def _method(cfg: DictConfig) -> tuple[Method, str]:
     if cfg.checkpoint is not None and cfg.model is not None:
         raise ConfigError(f"checkpoint={cfg.checkpoint} together with model={cfg.model}: a match takes one network")
     if given is None:
-        descriptor = instantiate(cfg.descriptor)
-        known = next((name for name, setting in PRESETS.items() if setting == descriptor), None)
-        return DescriptorMethod(descriptor), f"the descriptor {known or descriptor}"
+        method = DescriptorMethod(instantiate(cfg.descriptor))
+        return method, _called(method)
     chosen = [text for text in HydraConfig.get().overrides.task if text.lstrip("+~").startswith("descriptor")]
     if chosen:
         raise ConfigError(f"{chosen[0]} together with a network ({given}), which brings its descriptor; leave one out")
-    if cfg.model is not None and cfg.model not in shipped_models():
+    if cfg.model is not None and cfg.model not in (AUTO, *shipped_models()):
         raise ConfigError(
-            f"model={cfg.model}: csm brings no such network; wanted {' or '.join(shipped_models())}; "
+            f"model={cfg.model}: csm brings no such network; wanted {' or '.join(shipped_models())} or {AUTO}; "
             "one of your own is given by checkpoint=FILE"
         )
     from csm.matching.network import load_model
 
-    network = load_model(given)
-    trained = f" (trained on {network.trained_on})" if network.trained_on else ""
-    return network, f"the learned descriptor of {Path(given).name}{trained}"
+    network = load_model("humans" if given == AUTO else given)
+    return network, _called(network, Path(given).name)
+
+
+def _called(method: Method, file: str = "") -> str:
+    """Return what to call a method in a sentence."""
+    if isinstance(method, DescriptorMethod):
+        known = next((name for name, setting in PRESETS.items() if setting == method.descriptor), None)
+        return f"the descriptor {known or method.descriptor}"
+    trained = getattr(method, "trained_on", "")
+    return f"the learned descriptor of {file or method.name}" + (f" (trained on {trained})" if trained else "")
 
 
 main = command("match")(run)

@@ -66,7 +66,9 @@ def image_columns(mirror: float, descriptor: Mapping[str, Any]) -> Tensor:
 
     Examples
     --------
-    >>> image_columns(0.5, {"name": "acd", "angles": 3, "k": 5, "cuts": 1, "order": 1}).tolist()
+    >>> from csm.descriptors import ACD
+    >>> from csm.descriptors.base import record
+    >>> image_columns(0.5, record(ACD(angles=3, k=5, cuts=1, order=1))).tolist()
     [0, 1, 4, 5, 2, 3]
     """
     if not 0 <= mirror <= 1:

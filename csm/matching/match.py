@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from csm.matching.result import Match
 from csm.matching.rows import Rows
 from csm.matching.signals import SAMPLES
 from csm.matching.subjects import Cleaning, Subject, on_given, subject_of
+from csm.matching.suited import AUTO, suited
 from csm.mesh.debris import body_of
 from csm.mesh.inputs import MeshLike
 from csm.mesh.shape import Mesh
@@ -47,7 +49,9 @@ def match(
     source, target
         Files that `csm.read_mesh` reads, meshes of csm or trimesh, or pairs (vertices, faces) of arrays.
     method
-        A descriptor, the name of a preset (the default is csm's own ACD), or a network of `csm.load_model`.
+        A descriptor, the name of a preset (the default is csm's own ACD), or a network of `csm.load_model`; "humans",
+        a network that csm brings; "auto": this network if the shapes look like human bodies to it, else csm's own ACD
+        (`csm.matching.suited`).
     matcher, refine
         A matcher or its name, "nearest" or for networks "argmax", and a refiner or its name: "multistart",
         "trusting", "joint", "zoomout", "bijective", "icp", "none" (`csm.matching.refinement`); "auto": "trusting" for
@@ -79,16 +83,20 @@ def match(
     >>> csm.match(humans.mesh("s00_p00"), humans.mesh("s00_p02"))  # doctest: +SKIP
     Match(s00_p00 -> s00_p02 by acd, nearest+multistart)
     """
-    chosen = as_method(method)
-    (rule,) = as_matchers([matcher], [chosen.refine if refine == "auto" else refine])
+    chosen, why = (None, "") if method == AUTO else (as_method(method), "")
+    as_matchers([matcher], ["none" if refine == "auto" else refine])  # unknown names are refused before the work
     store = store if isinstance(store, Store) else Store(store)
     if isinstance(chosen, PrecomputedMethod):
         clean = "off"  # its features are those of the given vertices
-    subjects = [subject_of(mesh, clean, name) for mesh, name in ((source, "source"), (target, "target"))]
+    first, second = (subject_of(mesh, clean, name) for mesh, name in ((source, "source"), (target, "target")))
     require_device(device)
-    here, there = _described(chosen, rule, [subject.cleaned.mesh for subject in subjects], store, device)
-    found = match_both_ways(rule, here, there)
-    return match_of(found, (subjects[0], subjects[1]), (here, there), chosen, rule)
+    meshes = [first.cleaned.mesh, second.cleaned.mesh]
+    if chosen is None:
+        chosen, why = suited(meshes, store, device)
+    (rule,) = as_matchers([matcher], [chosen.refine if refine == "auto" else refine])
+    here, there = _described(chosen, rule, meshes, store, device)
+    found = match_of(match_both_ways(rule, here, there), (first, second), (here, there), chosen, rule)
+    return replace(found, notes=(why, *found.notes)) if why else found
 
 
 def _described(method: Method, rule: Matcher, meshes: list[Mesh], store: Store, device: str) -> list[Described]:
