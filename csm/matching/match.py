@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
 
 import numpy as np
 
@@ -50,12 +49,10 @@ def match(
         Files that `csm.read_mesh` reads, meshes of csm or trimesh, or pairs (vertices, faces) of arrays.
     method
         A descriptor, the name of a preset (the default is csm's own ACD), or a network of `csm.load_model`; "humans",
-        a network that csm brings; "auto": this network if the shapes look like human bodies to it, else csm's own ACD
-        (`csm.matching.suited`).
+        a network that csm brings; "auto": this where the shapes look human (`csm.matching.suited`), else csm's own ACD.
     matcher, refine
-        A matcher or its name, "nearest" or for networks "argmax", and a refiner or its name: "multistart",
-        "trusting", "joint", "zoomout", "bijective", "icp", "none" (`csm.matching.refinement`); "auto": "trusting" for
-        a network, "multistart" for a descriptor.
+        A matcher or its name, "nearest" or for networks "argmax", and a refiner or its name
+        (`csm.matching.refinement`); "auto": "trusting" for a network, "multistart" for a descriptor; "none".
     clean
         "auto" mends copies of the meshes first (`csm.clean`) where they need it; "off" takes them as they are.  The
         result is on the given vertices in either case.
@@ -71,10 +68,8 @@ def match(
 
     Raises
     ------
-    MeshError
-        If a file cannot be read or a mesh cannot be used.
-    ConfigError
-        If there is no such method, matcher, refiner or device, or what is given is no mesh.
+    MeshError, ConfigError
+        If a mesh cannot be used; if there is no such method, matcher, refiner or device, or what is given is no mesh.
 
     Examples
     --------
@@ -83,20 +78,19 @@ def match(
     >>> csm.match(humans.mesh("s00_p00"), humans.mesh("s00_p02"))  # doctest: +SKIP
     Match(s00_p00 -> s00_p02 by acd, nearest+multistart)
     """
-    chosen, why = (None, "") if method == AUTO else (as_method(method), "")
+    chosen, why = None if method == AUTO else as_method(method), ""
     as_matchers([matcher], ["none" if refine == "auto" else refine])  # unknown names are refused before the work
     store = store if isinstance(store, Store) else Store(store)
     if isinstance(chosen, PrecomputedMethod):
         clean = "off"  # its features are those of the given vertices
-    first, second = (subject_of(mesh, clean, name) for mesh, name in ((source, "source"), (target, "target")))
+    subjects = subject_of(source, clean, "source"), subject_of(target, clean, "target")
     require_device(device)
-    meshes = [first.cleaned.mesh, second.cleaned.mesh]
+    meshes = [subject.cleaned.mesh for subject in subjects]
     if chosen is None:
         chosen, why = suited(meshes, store, device)
     (rule,) = as_matchers([matcher], [chosen.refine if refine == "auto" else refine])
     here, there = _described(chosen, rule, meshes, store, device)
-    found = match_of(match_both_ways(rule, here, there), (first, second), (here, there), chosen, rule)
-    return replace(found, notes=(why, *found.notes)) if why else found
+    return match_of(match_both_ways(rule, here, there), subjects, (here, there), chosen, rule, why)
 
 
 def _described(method: Method, rule: Matcher, meshes: list[Mesh], store: Store, device: str) -> list[Described]:
@@ -119,12 +113,16 @@ def match_of(
     described: tuple[Described, Described],
     method: Method,
     matcher: Matcher,
+    why: str = "",
 ) -> Match:
-    """Return the match of the ways between two cleaned meshes, on the vertices as they were given."""
+    """Return the match of the ways between two cleaned meshes, on the vertices as they were given.
+
+    Its first note is `why` it was made by the method.
+    """
     source, target = subjects
     forward, backward = on_given(found.forward, source, target), on_given(found.backward, target, source)
     features = _on_given_rows(described[0], source), _on_given_rows(described[1], target)
-    notes = (*_notes(source, target), *_against_input(*described))
+    notes = (*filter(None, [why]), *_notes(source, target), *_against_input(*described))
     return Match(source.given, target.given, forward, backward, method, matcher, notes, found.text, features)
 
 
