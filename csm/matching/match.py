@@ -81,8 +81,7 @@ def match(
     chosen, why = None if method == AUTO else as_method(method), ""
     as_matchers([matcher], ["none" if refine == "auto" else refine])  # unknown names are refused before the work
     store = store if isinstance(store, Store) else Store(store)
-    if isinstance(chosen, PrecomputedMethod):
-        clean = "off"  # its features are those of the given vertices
+    clean = "off" if isinstance(chosen, PrecomputedMethod) else clean  # its features are of the given vertices
     subjects = subject_of(source, clean, "source"), subject_of(target, clean, "target")
     require_device(device)
     meshes = [subject.cleaned.mesh for subject in subjects]
