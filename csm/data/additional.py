@@ -84,7 +84,12 @@ def additional(text: str, train_set: ShapeSet, names: Sequence[str], store: Stor
     if _variant(text):
         return Additional(_with_triangles(train_set, text, store), tuple(names))
     for name in _PUBLISHED:
-        if text.lower().startswith(f"{name}_"):
+        if text.startswith(f"{name.upper()}_"):
+            if train_set.name.upper().startswith(name.upper()):
+                raise ConfigError(
+                    f"data.also: {text} has the bodies of the training set, {train_set.name}, and test shapes may be "
+                    "among them; wanted another set, or remeshed_N or refined_N for the training shapes"
+                )
             shapes, split = find_set(None, text), data_set(name).splits[0]
             split.require(shapes.names, shapes.name, "train")
             return Additional(shapes, split.train, text)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import random
 from collections.abc import Mapping
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -141,6 +142,8 @@ def require_same_settings(path: Path, module: CSMModule, epochs: int | None = No
         With the settings that differ.
     """
     kept, wanted = (_flat(read) for read in (read_checkpoint(path)["hyper_parameters"], module.hparams))
+    known = signature(CSMModule).parameters.items()  # a checkpoint of an older csm lacks what came after it
+    kept = {name: option.default for name, option in known if name in wanted} | kept
     differing = sorted(key for key in kept.keys() | wanted.keys() if kept.get(key) != wanted.get(key))
     changed = [key for key in differing if key not in _FREE]
     if wanted.get(_PER_STEP) in (None, kept.get(_PER_STEP, 1)):

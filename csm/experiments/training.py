@@ -46,6 +46,7 @@ from csm.experiments.tensorboard import TensorBoardPanels
 from csm.learning.checkpoint import export_module
 from csm.learning.loading import LightningData
 from csm.learning.module import CSMModule
+from csm.learning.places import template_of
 from csm.learning.samples import also_classes
 
 
@@ -142,7 +143,7 @@ def _fit(training: Training, trainer: L.Trainer, folder: Path, resume: Path | st
     if module.inputs is not None:
         module.inputs.learn(sample.features for sample in loaded.fitted())
     if module.places is not None:
-        module.places.learn(loaded.sample(training.data.fit_names[0]))
+        module.places.learn(template_of(loaded.sample(name) for name in training.data.fit_names))
     if trainer.global_rank:
         torch.manual_seed(training.seed + trainer.global_rank)  # weights and order are those of rank 0, dropout is not
     begun = time.perf_counter()

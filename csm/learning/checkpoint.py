@@ -54,7 +54,12 @@ def export_module(module: CSMModule, folder: Path, *, classifier: bool = False, 
 
 def _written(name: str, tensor: Tensor, half: bool) -> Tensor:
     plain = tensor.detach().cpu().contiguous()
-    return plain.half() if half and plain.is_floating_point() and not name.startswith("inputs.") else plain
+    if not half or not plain.is_floating_point() or name.startswith("inputs."):
+        return plain
+    small = plain.half()
+    if not torch.isfinite(small).all():
+        raise ConfigError(f"{name} has numbers that half precision cannot hold; export it without half")
+    return small
 
 
 def load_module(path: str | os.PathLike[str]) -> CSMModule:
@@ -139,7 +144,7 @@ def _load_checkpoint(path: Path) -> CSMModule:
 def _load_export(path: Path) -> CSMModule:
     hparams = json.loads(read_bytes(path))
     require_plain(hparams, path)
-    module = CSMModule(**hparams)
+    module = CSMModule(**{**hparams, "also_classes": {}})  # what only served the training is not there
     try:
         weights = load_file(path.with_name(WEIGHTS))
     except (OSError, SafetensorError) as error:
@@ -149,7 +154,7 @@ def _load_export(path: Path) -> CSMModule:
     own = {name: tensor.shape for name, tensor in module.weights().items()}
     given = {name: tensor.shape for name, tensor in weights.items()}
     for name in sorted(own.keys() | given.keys()):
-        spared = name.startswith("classifier.") and name not in given
+        spared = name.startswith("classifier.") and name not in given and module.places is None
         if not spared and own.get(name) != given.get(name):
             raise DataError(f"{path}: the weights beside it belong to another network (they differ in {name})")
     with torch.no_grad():

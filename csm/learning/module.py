@@ -18,7 +18,7 @@ from csm.learning.places import Places
 from csm.learning.samples import NetworkInput, ShapeSample, mirrored_template
 from csm.learning.standardisation import Standardisation
 from csm.learning.variation import Variation, image_columns
-from csm.networks import Surface, build
+from csm.networks import Surface, build, stencils_of
 
 Schedule = Literal["constant", "cosine", "step", "drop", "one_cycle"]
 
@@ -119,6 +119,11 @@ class CSMModule(L.LightningModule):
         self.has_classifier = True
         self.inputs = Standardisation(in_channels) if standardise else None
         self.variation = self._variation(vary, standardise)
+        if mirror and stencils_of(**network):
+            raise ConfigError(
+                f"learning.mirror={mirror}: {network['name']} sees more of a shape than its descriptor, and it is not "
+                "known how that changes when a shape is mirrored; set learning.mirror=0"
+            )
         self.mirror = mirror
         self.register_buffer("image_columns", image_columns(mirror, descriptor), persistent=False)
         self.places = self._places(n_classes, places, basis_k)
@@ -159,6 +164,8 @@ class CSMModule(L.LightningModule):
         return Variation(spread)
 
     def _places(self, n_classes: int, k: int, basis_k: int) -> Places | None:
+        if isinstance(k, bool) or not isinstance(k, int):
+            raise ConfigError(f"learning.places={k}; wanted a number of eigenfunctions, or 0 for none")
         if k > basis_k:
             raise ConfigError(f"learning.places={k}, and the data hold {basis_k} eigenfunctions: set data.basis_k={k}")
         try:

@@ -11,11 +11,16 @@ leaves out whatever does not change the place, and points that are neighbours on
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Iterable
+
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
 from csm.learning.samples import ShapeSample
+
+LOG = logging.getLogger(__name__)
 
 
 class Places(nn.Module):
@@ -78,6 +83,26 @@ class Places(nn.Module):
         Tensor
             Shape (N, K).
         """
-        parts = (descriptor[begin : begin + block] for begin in range(0, len(descriptor), block))
+        descriptor = descriptor.to(self.functions.dtype)
+        parts = (descriptor[begin : begin + block] for begin in range(0, max(1, len(descriptor)), block))
         found = [torch.softmax(classifier(part), 1) @ self.functions for part in parts]
         return functional.normalize(torch.cat(found), dim=1)
+
+
+def template_of(samples: Iterable[ShapeSample]) -> ShapeSample:
+    """Return the shape that knows most points of the template, the first of such, which then stands for it.
+
+    A warning is logged where some of the points that others know are missing.
+    """
+    shapes = list(samples)
+    known = [set(sample.classes.tolist()) for sample in shapes]
+    most = max(range(len(shapes)), key=lambda i: len(known[i]))
+    best, missing = shapes[most], len(set().union(*known)) - len(known[most])
+    if missing:
+        LOG.warning(
+            "learning.places: %s stands for the template, and lacks %d of the points that other shapes know; vertices "
+            "there are described by the others alone",
+            best.name,
+            missing,
+        )
+    return best

@@ -36,8 +36,8 @@ def thinned(module: CSMModule, classes: IntArray, functions: int) -> CSMModule:
     if module.places is None:
         raise ConfigError("only a network that was trained with learning.places can do without points of its template")
     n, k = module.places.functions.shape
-    if not 2 <= functions <= k or len(classes) == 0 or classes.min() < 0 or classes.max() >= n:
-        raise ConfigError(f"wanted some of {n} points of the template, and 2 to {k} of its functions")
+    if not 2 <= functions <= k or not 0 < len(set(classes.tolist()) & set(range(n))) == len(classes):
+        raise ConfigError(f"wanted some of {n} points of the template, each once, and 2 to {k} of its functions")
     made = CSMModule(
         **{**module.hparams, "n_classes": len(classes), "places": functions, "also_classes": {}, "mirror": 0.0}
     )

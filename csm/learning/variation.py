@@ -36,8 +36,8 @@ class Variation(nn.Module):
 
     def __init__(self, spread: float) -> None:
         super().__init__()
-        if not spread >= 0:
-            raise ConfigError(f"learning.vary={spread}; wanted 0 for none, or a spread above, such as 0.3")
+        if isinstance(spread, bool) or not isinstance(spread, int | float) or not 0 <= spread < 10:
+            raise ConfigError(f"learning.vary={spread}; wanted 0 for none, or a spread up to 10, such as 0.3")
         self.spread = spread
 
     def forward(self, x: Tensor) -> Tensor:
@@ -71,8 +71,8 @@ def image_columns(mirror: float, descriptor: Mapping[str, Any]) -> Tensor:
     >>> image_columns(0.5, record(ACD(angles=3, k=5, cuts=1, order=1))).tolist()
     [0, 1, 4, 5, 2, 3]
     """
-    if not 0 <= mirror <= 1:
-        raise ConfigError(f"learning.mirror={mirror}; wanted a share of the steps from 0 to 1")
+    if isinstance(mirror, bool) or not isinstance(mirror, int | float) or not 0 <= mirror < 1:
+        raise ConfigError(f"learning.mirror={mirror}; wanted a share of the steps, from 0 to below 1, such as 0.5")
     if not mirror:
         return torch.zeros(0, dtype=torch.int64)
     try:

@@ -56,6 +56,8 @@ class NetworkMethod(Method):
         for name, tensor in sorted(self.module.state_dict().items()):
             if name.startswith("network.classifier.") and not self.module.has_classifier:
                 continue  # an export leaves it out, and what stands in its place is drawn at random
+            if name.startswith("others."):
+                continue  # the classifiers of further templates only served the training
             digest.update(name.encode() + tensor.detach().cpu().numpy().tobytes())
         hparams = self.module.hparams
         plain = {name: hparams[name] for name in ("network", "descriptor", "basis_k")}

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from csm.data.additional import additional
@@ -44,6 +46,12 @@ def test_a_set_that_is_not_in_the_data_folder_is_named(toys, tmp_path, monkeypat
     monkeypatch.setenv("CSM_DATA", str(tmp_path))
     with pytest.raises(DataError, match="wanted FAUST_6890, but no published set"):
         additional("FAUST_6890", toys, SPLIT.train, Store(tmp_path))
+
+
+def test_the_bodies_of_the_training_set_are_refused_as_test_shapes_may_be_among_them(toys, tmp_path):
+    faust = replace(toys, name="FAUST_6890")
+    with pytest.raises(ConfigError, match="FAUST_5k_remeshed has the bodies of the training set, FAUST_6890"):
+        additional("FAUST_5k_remeshed", faust, SPLIT.train, Store(tmp_path))
 
 
 def test_a_data_module_prepares_and_names_them(toys, tmp_path):

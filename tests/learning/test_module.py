@@ -219,10 +219,16 @@ def test_half_of_the_steps_see_a_mirror_image_whose_labels_have_a_classifier_of_
     ("mirror", "descriptor", "message"),
     [
         (0.5, record(Coordinates()), r"xyz: it is not known how its columns change .*; set learning\.mirror=0"),
-        (1.5, record(ACD(angles=4, k=8)), r"mirror=1\.5; wanted a share of the steps from 0 to 1"),
+        (1, record(ACD(angles=4, k=8)), "mirror=1; wanted a share of the steps, from 0 to below 1"),
+        ("x", record(ACD(angles=4, k=8)), "mirror=x; wanted a share"),
         (float("nan"), record(ACD(angles=4, k=8)), "wanted a share of the steps"),
     ],
 )
 def test_what_cannot_be_mirrored_is_an_error(mirror, descriptor, message):
     with pytest.raises(ConfigError, match=message):
         CSMModule({"name": "mlp"}, 3, 5, descriptor, mirror=mirror)
+
+
+def test_a_network_that_sees_more_than_the_descriptor_has_no_mirror_images():
+    with pytest.raises(ConfigError, match="diffusionnet sees more of a shape than its descriptor"):
+        CSMModule({"name": "diffusionnet"}, 48, 5, record(ACD(angles=4, k=8)), mirror=0.5)

@@ -7,7 +7,7 @@ from torch import nn
 from csm.data.prepare import Recipe, prepare_mesh
 from csm.data.store import Store
 from csm.descriptors import HKS
-from csm.learning.places import Places
+from csm.learning.places import Places, template_of
 from csm.learning.samples import shape_sample
 from csm.mesh.correspondence import PointMap
 from tests.shapes import blob
@@ -51,3 +51,19 @@ def test_more_eigenfunctions_than_there_are_is_an_error(sample):
         Places(162, 13).learn(sample)
     with pytest.raises(ValueError, match="2 or more"):
         Places(162, 1)
+
+
+def test_the_shape_that_knows_most_points_stands_for_the_template(sample, caplog):
+    fewer = sample._replace(name="fewer", rows=sample.rows[:100], classes=sample.classes[:100])
+    assert template_of([fewer, sample]) is sample
+    assert not caplog.records
+    other = sample._replace(name="other", rows=sample.rows[90:], classes=sample.classes[90:])
+    assert template_of([fewer, other]).name == "fewer"
+    assert "fewer stands for the template, and lacks 62 of the points" in caplog.text
+
+
+def test_rows_of_any_precision_and_none_at_all_have_places(sample):
+    places, classifier = Places(162, 8), nn.Linear(5, 162)
+    places.learn(sample)
+    assert places(torch.zeros(0, 5), classifier).shape == (0, 8)
+    assert places(torch.zeros(3, 5, dtype=torch.float16), classifier).dtype == torch.float32

@@ -3,12 +3,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
+from safetensors.torch import load_file, save_file
 
-from csm.errors import ConfigError
+from csm.errors import ConfigError, DataError
 from csm.learning.checkpoint import export_module, load_module
 from csm.learning.loading import LightningData
 from csm.learning.samples import NetworkInput, also_classes
 from csm.learning.thinning import thinned
+from csm.matching.network import load_model
 from tests.learning.toys import make
 from tests.toyset import toy_datamodule
 
@@ -57,7 +59,7 @@ def test_half_precision_changes_little_and_halves_the_file(module, loaded, tmp_p
     assert sizes[True] < 0.65 * sizes[False]
 
 
-@pytest.mark.parametrize(("classes", "functions"), [([0, 162], 8), ([], 8), ([1, 2], 17), ([1, 2], 1)])
+@pytest.mark.parametrize(("classes", "functions"), [([0, 162], 8), ([], 8), ([1, 2], 17), ([1, 2], 1), ([3, 3], 8)])
 def test_what_is_not_there_cannot_be_kept(module, classes, functions):
     with pytest.raises(ConfigError, match="wanted some of 162 points"):
         thinned(module, np.array(classes, dtype=np.int64), functions)
@@ -66,3 +68,21 @@ def test_what_is_not_there_cannot_be_kept(module, classes, functions):
 def test_a_network_that_describes_by_its_last_layer_needs_all_points(loaded):
     with pytest.raises(ConfigError, match=r"trained with learning\.places"):
         thinned(make(loaded), np.arange(9), 4)
+
+
+def test_an_export_has_one_key_and_needs_its_classifier(module, tmp_path):
+    file = export_module(module, tmp_path)
+    assert load_model(file).key == load_model(file).key
+    weights = load_file(tmp_path / "model.safetensors")
+    assert not any(name.startswith("others.") for name in weights)
+    save_file({k: x for k, x in weights.items() if not k.startswith("classifier.")}, tmp_path / "model.safetensors")
+    with pytest.raises(DataError, match=r"they differ in classifier\.bias"):
+        load_module(file)
+
+
+def test_numbers_that_half_precision_cannot_hold_are_refused(loaded, tmp_path):
+    large = make(loaded)
+    with torch.no_grad():
+        large.network.lift.weight[0, 0] = 1e5
+    with pytest.raises(ConfigError, match=r"lift\.weight has numbers that half precision cannot hold"):
+        export_module(large, tmp_path, half=True)

@@ -6,49 +6,52 @@ from dataclasses import replace
 
 import numpy as np
 
-from csm._types import FloatArray, IntArray
+from csm._types import IntArray
 from csm.matching.barycentric import BarycentricMap
 from csm.matching.base import Described
 from csm.matching.maps import VertexMap
-from csm.matching.nearest import nearest
 from csm.matching.refinement.base import RefinedMap
+from csm.matching.refinement.clusters import nearest_of_many
 from csm.matching.way import Way
+from csm.mesh.debris import body_of
 
 SURE = 0.05
 """How close to itself a vertex returns on the way there and back whose partner is kept, in units of sqrt(area)."""
 
 FAR = 0.15
-"""How far a refinement may move such a partner, in the same units: about a tenth of a human's geodesic diameter."""
+"""How far points in faces may be from such a partner, in the same units: a tenth of a human's geodesic diameter."""
 
 
 def anchored(done: RefinedMap, source: Described, target: Described) -> RefinedMap:
-    """Return a refined map with the nearest neighbours that return in place of partners that are far from them.
+    """Return a refined map in which vertices whose nearest neighbours return have these for partners.
 
-    Functional maps know shapes by their coarse form, and where this differs they may carry a hand along to a place that
-    no descriptor speaks for.
+    What is refined then is the rest: vertices that the descriptor is not sure of.  Functional maps know shapes by their
+    coarse form; they blur what a network knows to the vertex, and where the forms differ they may carry a hand along to
+    a place that no descriptor speaks for.  The map into faces stays the refined one, which is smooth, but where that is
+    far from the partner.  A functional map stays as it was: it is too coarse to tell the difference.
     """
-    there, back = nearest(source.rows, target.rows), nearest(target.rows, source.rows)
+    there, back = _nearest(source, target), _nearest(target, source)
     backward = None if done.backward is None else _kept(done.backward, target, source, back, there)
     return replace(done, forward=_kept(done.forward, source, target, there, back), backward=backward)
 
 
+def _nearest(here: Described, other: Described) -> IntArray:
+    found: IntArray = nearest_of_many(here.features.float(), other.features.float(), other.order).cpu().numpy()
+    return found
+
+
 def _kept(way: Way, here: Described, other: Described, there: IntArray, back: IntArray) -> Way:
     found = way.vertex_map
-    returns = _apart(here, back[there], np.arange(len(there))) < SURE
-    at = np.flatnonzero(returns & (_apart(other, there, found.indices) > FAR))
-    if len(at) == 0:
+    points = here.mesh.vertices
+    returns = np.linalg.norm(points[back[there]] - points, axis=1) < SURE * np.sqrt(body_of(here.mesh).area)
+    changed = returns & (found.indices >= 0) & (found.indices != there)
+    if not changed.any():
         return way
-    indices = found.indices.copy()
-    indices[at] = there[at]
-    moved, precise = replace(found, indices=indices), way.precise
-    return replace(way, vertex_map=moved, precise=None if precise is None else lambda: _pinned(precise(), moved, at))
-
-
-def _apart(shape: Described, first: IntArray, second: IntArray) -> FloatArray:
-    """Return the distances through space between vertices, in units of sqrt(area)."""
-    points = shape.mesh.vertices
-    apart: FloatArray = np.linalg.norm(points[first] - points[second], axis=1) / np.sqrt(shape.mesh.area)
-    return apart
+    kept = replace(found, indices=np.where(changed, there, found.indices))
+    places, precise = other.mesh.vertices, way.precise
+    apart = np.linalg.norm(places[there] - places[found.indices], axis=1)
+    far = np.flatnonzero(changed & (apart > FAR * np.sqrt(body_of(other.mesh).area)))
+    return replace(way, vertex_map=kept, precise=None if precise is None else lambda: _pinned(precise(), kept, far))
 
 
 def _pinned(precise: BarycentricMap, found: VertexMap, at: IntArray) -> BarycentricMap:
