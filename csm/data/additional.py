@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 from csm._places import load
@@ -10,7 +11,7 @@ from csm.data.registry import data_set, find_set
 from csm.data.shapes import ShapeSet
 from csm.data.store import Store
 from csm.data.variants import Variant, VariantSet
-from csm.errors import ConfigError
+from csm.errors import ConfigError, DataError
 
 _PUBLISHED = ("faust", "scape")
 """Data sets whose shapes can be added: those that have a split."""
@@ -56,8 +57,8 @@ def additional(text: str, train_set: ShapeSet, names: Sequence[str], store: Stor
     text
         "remeshed_N" or "refined_N": the training shapes with N vertices and other triangles, or finer; "humans",
         "humans_remeshed_N", "humans_refined_N": the training persons of the built-in humans; the path of a file that
-        ``csm bodies`` has written, "FILE.npz", also with other triangles, "FILE.npz:remeshed_N"; a set in the folder
-        `CSM_DATA`, such as "FAUST_6890": the training shapes of its first split.
+        ``csm bodies`` has written, "FILE.npz", also with other triangles, "FILE.npz:remeshed_N"; a set beside the
+        training set or in the folder `CSM_DATA`, "FAUST_6890" or "SCAPE_5000": the training shapes of its first split.
     train_set, names
         The training set, and its shapes that are fitted.
     store
@@ -90,14 +91,23 @@ def additional(text: str, train_set: ShapeSet, names: Sequence[str], store: Stor
                     f"data.also: {text} has the bodies of the training set, {train_set.name}, and test shapes may be "
                     "among them; wanted another set, or remeshed_N or refined_N for the training shapes"
                 )
-            shapes, split = find_set(None, text), data_set(name).splits[0]
+            shapes, split = _found(text, train_set), data_set(name).splits[0]
             split.require(shapes.names, shapes.name, "train")
             return Additional(shapes, split.train, text)
     raise ConfigError(
         f"data.also: {text!r} is no set that can be added; wanted remeshed_N or refined_N, with N vertices, humans, "
         "humans_remeshed_N or humans_refined_N, a file of bodies, FILE.npz, FILE.npz:remeshed_N or FILE.npz:refined_N, "
-        "or a set in the folder CSM_DATA, such as FAUST_6890"
+        "or a set beside the training set or in the folder CSM_DATA, such as FAUST_6890 or SCAPE_5000"
     )
+
+
+def _found(name: str, train_set: ShapeSet) -> ShapeSet:
+    """Return a published set from beside the training set, or from the data folder."""
+    root = getattr(train_set, "root", None)
+    if root is not None:
+        with suppress(DataError):
+            return find_set(root.parent, name)
+    return find_set(None, name)
 
 
 def _variant(text: str) -> tuple[Variant, int] | None:

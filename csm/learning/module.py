@@ -160,7 +160,9 @@ class CSMModule(L.LightningModule):
 
     def _variation(self, spread: float, standardise: bool) -> Variation:
         if spread and not standardise:
-            raise ConfigError("learning.vary is in deviations of a standardised input: set learning.standardise=true")
+            raise ConfigError(
+                "learning.vary is in deviations of a standardised input: set learning.vary=0 or standardise"
+            )
         return Variation(spread)
 
     def _places(self, n_classes: int, k: int, basis_k: int) -> Places | None:

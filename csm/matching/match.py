@@ -143,7 +143,7 @@ def _against_input(here: Described, there: Described) -> list[str]:
     return [
         f"the network may not know such shapes: of its descriptor's nearest neighbours {100 * learned:.0f} % return to "
         f"their place on the way there and back, of those of the descriptor that it was given {100 * plain:.0f} %; try "
-        "without the checkpoint"
+        "without the network"
     ]
 
 

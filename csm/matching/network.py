@@ -47,6 +47,8 @@ class NetworkMethod(Method):
     def trained_on(self) -> str:
         """What it was trained on, in words; empty where the checkpoint does not say."""
         known, epochs = self.training.get("set"), self.training.get("epochs")
+        if known and (also := self.training.get("also")):
+            known = " and ".join([str(known), *map(str, also)])
         return f"{known}, {counted(epochs, 'epoch')}" if known and epochs else str(known or "")
 
     @cached_property

@@ -186,7 +186,7 @@ def test_the_input_is_varied_in_training_only_and_only_where_it_is_standardised(
     torch.testing.assert_close(module(sample.features, sample.surface), still)
     module.train()
     assert not torch.allclose(module(sample.features, sample.surface), still)
-    with pytest.raises(ConfigError, match=r"set learning\.standardise=true"):
+    with pytest.raises(ConfigError, match=r"set learning\.vary=0 or standardise"):
         make(loaded, vary=0.3)
 
 
