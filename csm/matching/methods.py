@@ -171,7 +171,10 @@ def as_method(method: Method | Descriptor | str) -> Method:
         network: Method = load("csm.matching.network:load_model")(method)
         return network
     if isinstance(method, str):
-        return DescriptorMethod(preset(method), method)
+        try:
+            return DescriptorMethod(preset(method), method)
+        except ConfigError as error:
+            raise ConfigError(f"{error}; and as networks {', '.join(shipped_models())}") from error
     raise ConfigError(
         f"a method is a descriptor, the name of a preset or a trained network (csm.load_model), got a "
         f"{type(method).__name__}"
