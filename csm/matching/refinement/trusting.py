@@ -64,8 +64,10 @@ class Trusting(Refiner):
         done = (self.joint if trusted else self.search)(start, source, target)
         if trusted:
             done = anchored(done, source, target)
-        said = f"{100 * share:.0f} % of the descriptor's nearest neighbours return to near their place, so the start was "
-        return replace(done, text=f"{said}{'kept' if trusted else 'searched for'}: {done.text}")
+        so = f"the start was {'kept' if trusted else 'searched for'}: {done.text}"
+        return replace(
+            done, text=f"{100 * share:.0f} % of the descriptor's nearest neighbours return near their place, so {so}"
+        )
 
 
 def returning(source: Described, target: Described) -> float:
