@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from csm._counts import counted
 from csm._types import FloatArray, IntArray
+from csm.matching.base import Described
 from csm.matching.calibration import Calibration, calibration
 from csm.matching.maps import VertexMap
 from csm.matching.nearest import nearest
-from csm.matching.signals import NEAR, OF_MAPS, Sides, map_signals, spectral_signals
+from csm.matching.signals import NEAR, OF_MAPS, SAMPLES, Sides, map_signals, spectral_signals
 from csm.mesh.debris import body_of
 from csm.mesh.shape import Mesh
 
@@ -188,3 +189,9 @@ def share_returning(source: Mesh, at: IntArray, here: NDArray[Any] | Tensor, the
     back = nearest(there[nearest(here[at], there)], here)
     away = np.linalg.norm(source.vertices[back] - source.vertices[at], axis=1)
     return float((away < NEAR * np.sqrt(body_of(source).area)).mean())
+
+
+def returning(source: Described, target: Described) -> float:
+    """Return how many nearest neighbours return to their place, of the shape where fewer do."""
+    ways = ((source, target), (target, source))
+    return min(share_returning(here.mesh, here.order[:SAMPLES], here.rows, there.rows) for here, there in ways)

@@ -78,7 +78,7 @@ def match(
     >>> csm.match(humans.mesh("s00_p00"), humans.mesh("s00_p02"))  # doctest: +SKIP
     Match(s00_p00 -> s00_p02 by acd, nearest+multistart)
     """
-    chosen, why = None if method == AUTO else as_method(method), ""
+    chosen, why = None if isinstance(method, str) and method == AUTO else as_method(method), ""
     as_matchers([matcher], ["none" if refine == "auto" else refine])  # unknown names are refused before the work
     store = store if isinstance(store, Store) else Store(store)
     clean = "off" if isinstance(chosen, PrecomputedMethod) else clean  # its features are of the given vertices

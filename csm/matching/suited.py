@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from csm.data.store import Store
+from csm.matching.confidence import returning
 from csm.matching.methods import Method, as_method
-from csm.matching.refinement.trusting import returning
 from csm.mesh.shape import Mesh
 
 AUTO = "auto"

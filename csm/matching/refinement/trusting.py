@@ -14,13 +14,12 @@ from typing import ClassVar
 
 from csm.errors import ConfigError
 from csm.matching.base import Described
-from csm.matching.confidence import share_returning
+from csm.matching.confidence import returning
 from csm.matching.maps import VertexMap
 from csm.matching.refinement.anchors import anchored
 from csm.matching.refinement.base import RefinedMap, Refiner
 from csm.matching.refinement.joint import Joint
 from csm.matching.refinement.multistart import Multistart
-from csm.matching.signals import SAMPLES
 
 
 @dataclass(frozen=True)
@@ -68,9 +67,3 @@ class Trusting(Refiner):
         return replace(
             done, text=f"{100 * share:.0f} % of the descriptor's nearest neighbours return near their place, so {so}"
         )
-
-
-def returning(source: Described, target: Described) -> float:
-    """Return how many nearest neighbours return to their place, of the shape where fewer do."""
-    ways = ((source, target), (target, source))
-    return min(share_returning(here.mesh, here.order[:SAMPLES], here.rows, there.rows) for here, there in ways)

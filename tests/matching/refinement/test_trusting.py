@@ -6,11 +6,12 @@ import torch
 
 from csm.errors import ConfigError
 from csm.matching.base import Described
+from csm.matching.confidence import returning
 from csm.matching.maps import VertexMap
 from csm.matching.refinement.base import RefinedMap
 from csm.matching.refinement.joint import Joint
 from csm.matching.refinement.multistart import Multistart
-from csm.matching.refinement.trusting import Trusting, returning
+from csm.matching.refinement.trusting import Trusting
 from csm.matching.way import Way
 from tests.shapes import blob
 
