@@ -36,9 +36,10 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     if cfg.folder is not None:
         from csm.commands.collection import run_collection
 
-        if cfg.model == AUTO:
+        method, file = _method(cfg)
+        if isinstance(method, str):
             raise ConfigError("model=auto chooses for two meshes; with folder= say model=humans, or leave it out")
-        return run_collection(cfg, *_method(cfg))
+        return run_collection(cfg, method, _called(method, file))
     if None in (cfg.source, cfg.target):
         raise ConfigError("match needs two meshes: csm match SOURCE TARGET [OUT], or a folder of them: folder=DIR")
     for key in ("matching", "refine"):
@@ -47,18 +48,18 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     begun = time.perf_counter()
     folder = Path(cfg.out or f"{Path(cfg.source).stem}_to_{Path(cfg.target).stem}")
     _require_place(folder, [Path(cfg.source), Path(cfg.target)], cfg.overwrite)
-    method, text = _method(cfg)
+    method, file = _method(cfg)
     match = match_meshes(
         cfg.source,
         cfg.target,
-        AUTO if cfg.model == AUTO else method,
+        method,
         cfg.matching,
         cfg.refine,
         clean=cfg.clean,
         store=Store(cfg.store),
         device=cfg.device,
     )
-    text = text if match.method is method else _called(match.method)
+    text = _called(match.method, file)
     write_match(match, folder, text, time.perf_counter() - begun)
     for note in match.notes:
         print(f"note: {note}")
@@ -82,14 +83,13 @@ def _require_place(folder: Path, inputs: list[Path], overwrite: bool) -> None:
     require_own(outputs[:-1], outputs[-1], overwrite, OVERWRITE)
 
 
-def _method(cfg: DictConfig) -> tuple[Method, str]:
-    """Return the method, and what to call it."""
+def _method(cfg: DictConfig) -> tuple[Method | str, str]:
+    """Return the method, or `AUTO` where the meshes decide, and the name of the file that it is of."""
     given = cfg.checkpoint if cfg.checkpoint is not None else cfg.model
     if cfg.checkpoint is not None and cfg.model is not None:
         raise ConfigError(f"checkpoint={cfg.checkpoint} together with model={cfg.model}: a match takes one network")
     if given is None:
-        method = DescriptorMethod(instantiate(cfg.descriptor))
-        return method, _called(method)
+        return DescriptorMethod(instantiate(cfg.descriptor)), ""
     chosen = [text for text in HydraConfig.get().overrides.task if text.lstrip("+~").startswith("descriptor")]
     if chosen:
         raise ConfigError(f"{chosen[0]} together with a network ({given}), which brings its descriptor; leave one out")
@@ -100,11 +100,10 @@ def _method(cfg: DictConfig) -> tuple[Method, str]:
         )
     from csm.matching.network import load_model
 
-    network = load_model("humans" if given == AUTO else given)
-    return network, _called(network, Path(given).name)
+    return (AUTO, "") if cfg.model == AUTO else (load_model(given), Path(given).name)
 
 
-def _called(method: Method, file: str = "") -> str:
+def _called(method: Method, file: str) -> str:
     """Return what to call a method in a sentence."""
     if isinstance(method, DescriptorMethod):
         known = next((name for name, setting in PRESETS.items() if setting == method.descriptor), None)

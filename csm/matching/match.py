@@ -54,8 +54,7 @@ def match(
         A matcher or its name, "nearest" or for networks "argmax", and a refiner or its name
         (`csm.matching.refinement`); "auto": "trusting" for a network, "multistart" for a descriptor; "none".
     clean
-        "auto" mends copies of the meshes first (`csm.clean`) where they need it; "off" takes them as they are.  The
-        result is on the given vertices in either case.
+        "auto" mends copies of the meshes first (`csm.clean`) where they need it; the result is on the given vertices.
     store
         Where descriptors and bases are kept, or its folder; by default csm's store in the user's cache folder.
     device
@@ -78,7 +77,8 @@ def match(
     >>> csm.match(humans.mesh("s00_p00"), humans.mesh("s00_p02"))  # doctest: +SKIP
     Match(s00_p00 -> s00_p02 by acd, nearest+multistart)
     """
-    chosen, why = None if isinstance(method, str) and method == AUTO else as_method(method), ""
+    automatic = isinstance(method, str) and method == AUTO
+    chosen, why, known = None if automatic else as_method(method), "", list[Described]()
     as_matchers([matcher], ["none" if refine == "auto" else refine])  # unknown names are refused before the work
     store = store if isinstance(store, Store) else Store(store)
     clean = "off" if isinstance(chosen, PrecomputedMethod) else clean  # its features are of the given vertices
@@ -86,9 +86,9 @@ def match(
     require_device(device)
     meshes = [subject.cleaned.mesh for subject in subjects]
     if chosen is None:
-        chosen, why = suited(meshes, store, device)
+        chosen, why, known = suited(meshes, store, device)
     (rule,) = as_matchers([matcher], [chosen.refine if refine == "auto" else refine])
-    here, there = _described(chosen, rule, meshes, store, device)
+    here, there = known or _described(chosen, rule, meshes, store, device)
     return match_of(match_both_ways(rule, here, there), subjects, (here, there), chosen, rule, why)
 
 

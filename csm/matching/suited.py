@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from csm.data.store import Store
+from csm.matching.base import Described
 from csm.matching.confidence import returning
 from csm.matching.methods import Method, as_method
 from csm.mesh.shape import Mesh
@@ -24,7 +25,7 @@ remeshed FAUST 0.91 and more.
 """
 
 
-def suited(meshes: Sequence[Mesh], store: Store, device: str = "cpu") -> tuple[Method, str]:
+def suited(meshes: Sequence[Mesh], store: Store, device: str = "cpu") -> tuple[Method, str, list[Described]]:
     """Choose between the network `humans` and the descriptor `acd` for two meshes.
 
     Parameters
@@ -32,19 +33,20 @@ def suited(meshes: Sequence[Mesh], store: Store, device: str = "cpu") -> tuple[M
     meshes
         Two, clean and oriented outwards.
     store
-        Where what is computed for the choice is kept; the match finds it there.
+        Where what is computed is kept.
     device
         Where the network runs.
 
     Returns
     -------
-    tuple[Method, str]
-        The method, and why it was chosen, in words.
+    tuple[Method, str, list[Described]]
+        The method, why it was chosen, in words, and the meshes as it describes them, if it is the network.
     """
     network = as_method("humans")
-    here, there = (network.describe(mesh, store, device) for mesh in meshes)
-    share = returning(here, there)
+    described = [network.describe(mesh, store, device) for mesh in meshes]
+    share = returning(*described)
     why = f"model=auto: {100 * share:.0f} % of the nearest neighbours of the network humans return to their place"
     if share >= KNOWN:
-        return network, f"{why}, as on human bodies, so it was taken; model=null is the descriptor acd"
-    return as_method("acd"), f"{why}, fewer than on human bodies, so the descriptor acd was taken; model=humans insists"
+        return network, f"{why}, as on human bodies, so it was taken; model=null is the descriptor acd", described
+    why += ", fewer than on human bodies, so the descriptor acd was taken; model=humans insists"
+    return as_method("acd"), why, []

@@ -15,14 +15,15 @@ from tests.shapes import blob
 def test_the_network_is_taken_where_its_neighbours_return(tmp_path, monkeypatch, share, name):
     monkeypatch.setattr(module, "returning", lambda *_: share)
     monkeypatch.setattr(type(as_method("humans")), "describe", lambda *_: None)
-    method, why = suited([blob(2), blob(2)], Store(tmp_path))
+    method, why, described = suited([blob(2), blob(2)], Store(tmp_path))
     assert method.name == name
+    assert len(described) == (2 if name == "humans" else 0)
     assert why.startswith(f"model=auto: {100 * share:.0f} % of the nearest neighbours")
     assert ("model=null" if name == "humans" else "model=humans") in why
 
 
 def test_a_match_says_what_was_chosen(tmp_path, monkeypatch):
-    monkeypatch.setattr("csm.matching.match.suited", lambda *_: (as_method("xyz"), "because"))
+    monkeypatch.setattr("csm.matching.match.suited", lambda *_: (as_method("xyz"), "because", []))
     found = csm.match(blob(2), blob(2), "auto", store=Store(tmp_path))
     assert (found.method.name, found.notes[0]) == ("xyz", "because")
     assert found.matcher.name == "nearest+multistart"
@@ -37,7 +38,7 @@ def test_what_is_wrong_is_said_before_the_choice(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_people_are_known(tmp_path):
     humans = csm.load_humans()
-    method, _ = suited([humans.mesh("s08_p01"), humans.mesh("s09_p02")], Store(tmp_path))
+    method, *_ = suited([humans.mesh("s08_p01"), humans.mesh("s09_p02")], Store(tmp_path))
     assert method.name == "humans"
 
 
@@ -54,5 +55,5 @@ def test_people_are_known(tmp_path):
 )
 def test_animals_are_not_taken_for_people(data_set, tmp_path, name, pair, chosen):
     shapes = csm.recognise(data_set(name))
-    method, _ = suited([shapes.mesh(each) for each in pair], Store(tmp_path))
+    method, *_ = suited([shapes.mesh(each) for each in pair], Store(tmp_path))
     assert method.name == chosen

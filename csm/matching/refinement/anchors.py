@@ -9,6 +9,7 @@ import numpy as np
 from csm._types import IntArray
 from csm.matching.barycentric import BarycentricMap
 from csm.matching.base import Described
+from csm.matching.confidence import there_and_back
 from csm.matching.maps import VertexMap
 from csm.matching.refinement.base import RefinedMap
 from csm.matching.refinement.clusters import nearest_of_many
@@ -35,21 +36,20 @@ def anchored(done: RefinedMap, source: Described, target: Described) -> RefinedM
     return replace(done, forward=_kept(done.forward, source, target, there, back), backward=backward)
 
 
-def _nearest(here: Described, other: Described) -> IntArray:
-    found: IntArray = nearest_of_many(here.features.float(), other.features.float(), other.order).cpu().numpy()
-    return found
+def _nearest(here: Described, other: Described) -> VertexMap:
+    found = nearest_of_many(here.features.float(), other.features.float(), other.order)
+    return VertexMap(found.cpu().numpy(), other.mesh.n_vertices)
 
 
-def _kept(way: Way, here: Described, other: Described, there: IntArray, back: IntArray) -> Way:
-    found = way.vertex_map
-    points = here.mesh.vertices
-    returns = np.linalg.norm(points[back[there]] - points, axis=1) < SURE * np.sqrt(body_of(here.mesh).area)
-    changed = returns & (found.indices >= 0) & (found.indices != there)
+def _kept(way: Way, here: Described, other: Described, there: VertexMap, back: VertexMap) -> Way:
+    found, sure = way.vertex_map, there.indices
+    returns = there_and_back(there, back, here.mesh) < SURE
+    changed = returns & (found.indices >= 0) & (found.indices != sure)
     if not changed.any():
         return way
-    kept = replace(found, indices=np.where(changed, there, found.indices))
+    kept = replace(found, indices=np.where(changed, sure, found.indices))
     places, precise = other.mesh.vertices, way.precise
-    apart = np.linalg.norm(places[there] - places[found.indices], axis=1)
+    apart = np.linalg.norm(places[sure] - places[found.indices], axis=1)
     far = np.flatnonzero(changed & (apart > FAR * np.sqrt(body_of(other.mesh).area)))
     return replace(way, vertex_map=kept, precise=None if precise is None else lambda: _pinned(precise(), kept, far))
 
