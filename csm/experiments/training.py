@@ -48,6 +48,7 @@ from csm.learning.loading import LightningData
 from csm.learning.module import CSMModule
 from csm.learning.places import template_of
 from csm.learning.samples import also_classes
+from csm.learning.twins import learn_twins
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,12 +144,15 @@ def _fit(training: Training, trainer: L.Trainer, folder: Path, resume: Path | st
     if module.inputs is not None:
         module.inputs.learn(sample.features for sample in loaded.fitted())
     if module.places is not None:
-        module.places.learn(template_of(loaded.sample(name) for name in training.data.fit_names))
+        template = template_of(loaded.sample(name) for name in training.data.fit_names)
+        module.places.learn(template, training.data.shape(template.name).mesh)
     if trainer.global_rank:
         torch.manual_seed(training.seed + trainer.global_rank)  # weights and order are those of rank 0, dropout is not
     begun = time.perf_counter()
     with saying(lambda: _what_is_kept(folder, trainer)), _interruptible():
         trainer.fit(module, datamodule=loaded, ckpt_path=begin, weights_only=True)
+    if module.places is not None and module.mirror:
+        learn_twins(module, [loaded.sample(name) for name in training.data.fit_names])
     seconds = time.perf_counter() - begun
     module.hparams["training"]["epochs"] = trainer.current_epoch  # fewer than asked for where max_time ended it
     checkpoint = folder / "model.ckpt"

@@ -15,6 +15,7 @@ from torch import Tensor
 
 from csm.errors import ConfigError, CsmError, DataError
 from csm.learning.module import CSMModule
+from csm.learning.places import LATER
 from csm.mesh.io import atomic_path, read_bytes
 
 WEIGHTS, SETTINGS = "model.safetensors", "model.json"
@@ -154,7 +155,8 @@ def _load_export(path: Path) -> CSMModule:
     own = {name: tensor.shape for name, tensor in module.weights().items()}
     given = {name: tensor.shape for name, tensor in weights.items()}
     for name in sorted(own.keys() | given.keys()):
-        spared = name.startswith("classifier.") and name not in given and module.places is None
+        needless = name.startswith("classifier.") and module.places is None
+        spared = name not in given and (needless or name.removeprefix("places.") in LATER)
         if not spared and own.get(name) != given.get(name):
             raise DataError(f"{path}: the weights beside it belong to another network (they differ in {name})")
     with torch.no_grad():

@@ -8,6 +8,7 @@ import lightning as L
 import torch
 from scipy.spatial.transform import Rotation
 from torch import Tensor, nn
+from torch.nn import functional
 from torch.optim import Adam
 from torch.optim.lr_scheduler import CosineAnnealingLR, LRScheduler, OneCycleLR, StepLR
 
@@ -16,8 +17,10 @@ from csm.errors import ConfigError
 from csm.learning.loss import Products, linear_cross_entropy
 from csm.learning.places import Places
 from csm.learning.samples import NetworkInput, ShapeSample, mirrored_template
+from csm.learning.sides import mended
 from csm.learning.standardisation import Standardisation
 from csm.learning.variation import Variation, image_columns
+from csm.mesh.shape import Mesh
 from csm.networks import Surface, build, stencils_of
 
 Schedule = Literal["constant", "cosine", "step", "drop", "one_cycle"]
@@ -147,9 +150,41 @@ class CSMModule(L.LightningModule):
         return self.network.describe(self.variation(x), surface)
 
     @torch.no_grad()
-    def descriptor(self, last: Tensor) -> Tensor:
-        """Return the learned descriptor, of the network's last layer, shape (N, Q): that itself, or the places."""
-        return last if self.places is None else self.places(last, self.network.classifier)
+    def descriptor(self, last: Tensor, given: NetworkInput, mesh: Mesh | None = None) -> Tensor:
+        """Return the learned descriptor in evaluation mode, shape (N, Q): the network's last layer, or the places.
+
+        Where the twins of the template's points are known, the places are the means of those of the shape and of its
+        mirror image, two opinions that seldom go wrong together.
+
+        Parameters
+        ----------
+        last
+            Shape (N, Q): the network's last layer, as `last_layer` returns it.
+        given
+            The shape.
+        mesh
+            Its mesh, with which parts that are taken for their mirror images are mended (`csm.learning.sides`).
+        """
+        if self.places is None:
+            return last
+        classifier = self.network.classifier
+        if not self.mirror or not self.places.has_twins:
+            plain: Tensor = self.places(last, classifier)
+            return plain
+        columns = self.image_columns.to(given.features.device)
+        image = self.last_layer(given._replace(features=given.features[:, columns]))
+        rows = self._read(last, mesh, image=False) + self._read(image, mesh, image=True)
+        found: Tensor = functional.normalize(rows, dim=1)
+        return found
+
+    def _read(self, last: Tensor, mesh: Mesh | None, *, image: bool) -> Tensor:
+        """Return the places of a shape, of its last layer or of that of its mirror image, before they have length 1."""
+        assert self.places is not None
+        places, classifier = self.places, self.network.classifier
+        found = places.read(last, classifier, twins=image)
+        if mesh is None:
+            return found.rows
+        return mended(found, lambda: places.read(last, classifier, twins=not image), mesh)
 
     def weights(self) -> dict[str, Tensor]:
         """Return the tensors that a trained network consists of: those of the network, standardisation and places."""
@@ -213,12 +248,12 @@ class CSMModule(L.LightningModule):
         """Return the learned descriptor of one shape; the loss is logged, the errors are a callback's business."""
         last = self(sample.features, sample.surface)
         self.log("val/loss", self.loss(last, sample), prog_bar=True, batch_size=sample.counts, sync_dist=True)
-        return self.descriptor(last)
+        return self.descriptor(last, NetworkInput(sample.features, sample.surface))
 
     @torch.no_grad()
-    def describe(self, given: NetworkInput) -> Tensor:
+    def describe(self, given: NetworkInput, mesh: Mesh | None = None) -> Tensor:
         """Return the learned descriptor of a shape in evaluation mode, shape (N, Q), on the device of the module."""
-        return self.descriptor(self.last_layer(given))
+        return self.descriptor(self.last_layer(given), given, mesh)
 
     @torch.no_grad()
     def last_layer(self, given: NetworkInput) -> Tensor:

@@ -7,20 +7,46 @@ template's eigenfunctions over these points is a row of K numbers,
 
 the row of x in Pi Phi for the soft map Pi from the shape to the template.  Unlike the last layer of the network it
 leaves out whatever does not change the place, and points that are neighbours on the template count as nearly the same.
+
+On a template with a left and a right side each point c has a twin on the other side.  With twins for points the same
+probabilities say where x is if left and right are exchanged: in the mirror image of the shape.
 """
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Iterable
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
 from csm.learning.samples import ShapeSample
+from csm.mesh.shape import Mesh
 
 LOG = logging.getLogger(__name__)
+
+LATER = ("points", "normals", "twins")
+"""What networks of older versions of csm do not know of their template."""
+
+PARTS = ("functions", *LATER)
+"""All that is known of a template, one row per point."""
+
+UNKNOWN = -1
+"""In place of the twin of a point, where there are none."""
+
+
+class Reading(NamedTuple):
+    """Where on the template the N vertices of a shape are.
+
+    Shapes: `rows` (N, K), means of the eigenfunctions; `points` and `normals` (N, 3), means of the positions of the
+    template's points, which has area 1, and of its outward normals there.
+    """
+
+    rows: Tensor
+    points: Tensor
+    normals: Tensor
 
 
 class Places(nn.Module):
@@ -45,15 +71,33 @@ class Places(nn.Module):
     """
 
     functions: Tensor
+    points: Tensor
+    normals: Tensor
+    twins: Tensor
 
     def __init__(self, n_classes: int, k: int) -> None:
         super().__init__()
         if k < 2:
             raise ValueError(f"{k} eigenfunctions of the template; wanted 2 or more")
         self.register_buffer("functions", torch.zeros(n_classes, k))
+        self.register_buffer("points", torch.zeros(n_classes, 3))
+        self.register_buffer("normals", torch.zeros(n_classes, 3))
+        self.register_buffer("twins", torch.full((n_classes,), UNKNOWN))
 
-    def learn(self, sample: ShapeSample) -> None:
-        """Take the eigenfunctions of a shape for those of the template; points that the shape lacks have zeros.
+    @property
+    def has_twins(self) -> bool:
+        """Whether the template's left and right are known."""
+        return bool((self.twins != UNKNOWN).any())
+
+    def learn(self, sample: ShapeSample, mesh: Mesh) -> None:
+        """Take the surface of a shape for that of the template; points that the shape lacks have zeros.
+
+        Parameters
+        ----------
+        sample
+            The shape, with at least K eigenpairs.
+        mesh
+            Its mesh.
 
         Raises
         ------
@@ -63,8 +107,11 @@ class Places(nn.Module):
         found, k = sample.surface.basis.evecs, self.functions.shape[1]
         if found.shape[1] < k:
             raise ValueError(f"wanted {k} eigenfunctions of the template, and the data hold {found.shape[1]}")
-        self.functions.zero_()
-        self.functions[sample.classes] = found[sample.rows, :k].to(self.functions)
+        points = (mesh.vertices - mesh.vertices.mean(0)) / mesh.area**0.5  # of a size that half precision can hold
+        given = found[:, :k], torch.as_tensor(points), torch.as_tensor(mesh.vertex_normals)
+        for own, values in zip((self.functions, self.points, self.normals), given, strict=True):
+            own.zero_()
+            own[sample.classes] = values[sample.rows].to(own)
 
     def forward(self, descriptor: Tensor, classifier: nn.Module, block: int = 1024) -> Tensor:
         """Return the places, rows of unit length.
@@ -83,10 +130,25 @@ class Places(nn.Module):
         Tensor
             Shape (N, K).
         """
-        descriptor = descriptor.to(self.functions.dtype)
+        return functional.normalize(self._means(descriptor, classifier, self.functions, block), dim=1)
+
+    def read(self, descriptor: Tensor, classifier: nn.Module, *, twins: bool = False, block: int = 1024) -> Reading:
+        """Return the places, or with `twins` those on the other side; further parameters as of `forward`."""
+        table = torch.cat([self.functions, self.points, self.normals], 1)
+        means = self._means(descriptor, classifier, table[self.twins] if twins else table, block)
+        return Reading(means[:, :-6], means[:, -6:-3], means[:, -3:])
+
+    def _means(self, descriptor: Tensor, classifier: nn.Module, table: Tensor, block: int) -> Tensor:
+        """Return the means of the rows of a table, shape (C, D), over the probable points, shape (N, D)."""
+        descriptor = descriptor.to(table.dtype)
         parts = (descriptor[begin : begin + block] for begin in range(0, max(1, len(descriptor)), block))
-        found = [torch.softmax(classifier(part), 1) @ self.functions for part in parts]
-        return functional.normalize(torch.cat(found), dim=1)
+        return torch.cat([torch.softmax(classifier(part), 1) @ table for part in parts])
+
+    def _load_from_state_dict(self, state_dict: dict[str, Any], prefix: str, *args: Any, **kwargs: Any) -> None:
+        """Load; a network of an older csm has eigenfunctions alone."""
+        for name in LATER:
+            state_dict.setdefault(prefix + name, getattr(self, name))
+        super()._load_from_state_dict(state_dict, prefix, *args, **kwargs)
 
 
 def template_of(samples: Iterable[ShapeSample]) -> ShapeSample:

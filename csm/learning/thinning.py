@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import torch
+from torch.nn import functional
 
 from csm._types import IntArray
 from csm.errors import ConfigError
 from csm.learning.module import CSMModule
+from csm.learning.places import PARTS
 
 
 def thinned(module: CSMModule, classes: IntArray, functions: int) -> CSMModule:
@@ -38,13 +40,14 @@ def thinned(module: CSMModule, classes: IntArray, functions: int) -> CSMModule:
     n, k = module.places.functions.shape
     if not 2 <= functions <= k or not 0 < len(set(classes.tolist()) & set(range(n))) == len(classes):
         raise ConfigError(f"wanted some of {n} points of the template, each once, and 2 to {k} of its functions")
-    made = CSMModule(
-        **{**module.hparams, "n_classes": len(classes), "places": functions, "also_classes": {}, "mirror": 0.0}
-    )
+    made = CSMModule(**{**module.hparams, "n_classes": len(classes), "places": functions, "also_classes": {}})
     kept = torch.as_tensor(classes)
     weights = {name: x for name, x in module.state_dict().items() if not name.startswith("others.")}
-    for name in ("network.classifier.weight", "network.classifier.bias", "places.functions"):
+    for name in ("network.classifier.weight", "network.classifier.bias", *(f"places.{name}" for name in PARTS)):
         weights[name] = weights[name][kept]
+    if module.places.has_twins:
+        rows = functional.normalize(module.places.functions, dim=1)
+        weights["places.twins"] = (rows[weights["places.twins"]] @ rows[kept].T).argmax(1)
     weights["places.functions"] = weights["places.functions"][:, :functions]
     made.load_state_dict(weights)
     return made.eval()

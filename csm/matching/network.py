@@ -74,13 +74,14 @@ class NetworkMethod(Method):
         """Return the learned descriptor of a mesh, computed on the device."""
         self.module.to(device)
         prepared = prepare_mesh(mesh, self.recipe, store)
-        last = self.module.last_layer(network_input(prepared))
+        seen = network_input(prepared)
+        last = self.module.last_layer(seen)
         classifier = None
         if self.module.has_classifier:
             linear = self.module.network.classifier
             classifier = Classifier(linear.weight.detach(), linear.bias.detach())
         given = torch.from_numpy(prepared.features).to(last.device)
-        return Described(mesh, self.module.descriptor(last), classifier, store, given, last)
+        return Described(mesh, self.module.descriptor(last, seen, mesh), classifier, store, given, last)
 
 
 def load_model(path: str | os.PathLike[str], name: str = "") -> NetworkMethod:

@@ -192,7 +192,7 @@ def test_the_input_is_varied_in_training_only_and_only_where_it_is_standardised(
 
 def test_places_are_what_a_network_describes_by(loaded):
     module, sample = make(loaded, places=16), loaded.sample(loaded.data.fit_names[0])
-    module.places.learn(sample)
+    module.places.learn(sample, loaded.data.shape(sample.name).mesh)
     found = module.describe(given(sample))
     last = module.last_layer(given(sample))
     torch.testing.assert_close(found, module.places(last, module.network.classifier))

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 import pytest
 import torch
@@ -25,7 +27,7 @@ def loaded(tmp_path_factory):
 @pytest.fixture(scope="module")
 def module(loaded):
     made = make(loaded, places=16, mirror=0.5, also_classes=also_classes(loaded.data, mirror=True), standardise=True)
-    made.places.learn(loaded.sample(loaded.data.fit_names[0]))
+    made.places.learn(loaded.sample(loaded.data.fit_names[0]), loaded.data.shape(loaded.data.fit_names[0]).mesh)
     return made
 
 
@@ -47,6 +49,18 @@ def test_some_points_share_the_probability(module, loaded):
     p = torch.softmax(module.network.classifier(last)[:, kept], 1) @ module.places.functions[kept, :5]
     found = described(thinned(module, kept, 5), loaded)
     torch.testing.assert_close(found, p / p.norm(dim=1, keepdim=True), atol=1e-5, rtol=1e-4)
+
+
+def test_twins_are_the_nearest_of_the_points_that_are_left(module, loaded):
+    paired = copy.deepcopy(module)
+    paired.places.twins.copy_(torch.arange(162).flip(0))
+    same = thinned(paired, np.arange(162), 16)
+    assert same.places.twins.tolist() == list(range(162))[::-1]
+    torch.testing.assert_close(described(same, loaded), described(paired, loaded))
+    kept = np.arange(0, 162, 3)
+    rows = torch.nn.functional.normalize(module.places.functions, dim=1)
+    wanted = [int((rows[161 - i] @ rows[kept].T).argmax()) for i in kept]
+    assert thinned(paired, kept, 5).places.twins.tolist() == wanted
 
 
 def test_half_precision_changes_little_and_halves_the_file(module, loaded, tmp_path):
