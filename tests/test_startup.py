@@ -57,6 +57,14 @@ def test_matching_by_a_descriptor_loads_no_network_and_no_plots(two_meshes):
     assert "torch" in loaded, "refinements compute with PyTorch"
 
 
+def test_matching_by_a_network_needs_no_training(two_meshes):
+    for seed in (1, 2):
+        write_mesh(two_meshes / f"{seed}.off", blob(3, seed))  # enough vertices for its 256 eigenpairs
+    loaded = loaded_by(two_meshes, "match", "1.off", "2.off", "learned", "model=humans", "refine=none")
+    assert not HEAVY & loaded
+    assert "torch" in loaded
+
+
 @pytest.mark.parametrize("words", [("check", "1.off"), ("clean", "1.off", "c.off"), ("describe", "1.off", "d.npz")])
 def test_what_needs_one_mesh_loads_no_network_and_no_plots(two_meshes, words):
     assert not {*HEAVY, "torch"} & loaded_by(two_meshes, *words)

@@ -14,14 +14,14 @@ from safetensors.torch import load_file, save_file
 from torch import Tensor
 
 from csm.errors import ConfigError, CsmError, DataError
-from csm.learning.module import CSMModule
+from csm.learning.describer import Describer
 from csm.learning.places import LATER
 from csm.mesh.io import atomic_path, read_bytes
 
 WEIGHTS, SETTINGS = "model.safetensors", "model.json"
 
 
-def export_module(module: CSMModule, folder: Path, *, classifier: bool = False, half: bool = False) -> Path:
+def export_module(module: Describer, folder: Path, *, classifier: bool = False, half: bool = False) -> Path:
     """Write a trained network to ``model.safetensors`` and its hyper-parameters to ``model.json``.
 
     Parameters
@@ -49,7 +49,7 @@ def export_module(module: CSMModule, folder: Path, *, classifier: bool = False, 
     with atomic_path(folder / WEIGHTS) as temporary:
         save_file(weights, temporary)
     with atomic_path(folder / SETTINGS) as temporary:
-        temporary.write_text(json.dumps(dict(module.hparams), indent=1) + "\n")
+        temporary.write_text(json.dumps(dict(module.settings), indent=1) + "\n")
     return folder / SETTINGS
 
 
@@ -63,7 +63,7 @@ def _written(name: str, tensor: Tensor, half: bool) -> Tensor:
     return small
 
 
-def load_module(path: str | os.PathLike[str]) -> CSMModule:
+def load_module(path: str | os.PathLike[str]) -> Describer:
     """Load a trained network: a Lightning checkpoint of ``csm train``, or the json file of an export.
 
     Nothing in the files is executed, and no configuration is needed.
@@ -137,15 +137,17 @@ def require_plain(hparams: Any, path: Path) -> None:
         raise DataError(f"{path}: not a checkpoint of csm, or it was changed: training is {hparams['training']!r}")
 
 
-def _load_checkpoint(path: Path) -> CSMModule:
-    read_checkpoint(path)
-    return CSMModule.load_from_checkpoint(path, map_location="cpu", weights_only=True)
+def _load_checkpoint(path: Path) -> Describer:
+    found = read_checkpoint(path)
+    module = Describer.of(found["hyper_parameters"])
+    module.load_state_dict({name: x for name, x in found["state_dict"].items() if not name.startswith("others.")})
+    return module
 
 
-def _load_export(path: Path) -> CSMModule:
+def _load_export(path: Path) -> Describer:
     hparams = json.loads(read_bytes(path))
     require_plain(hparams, path)
-    module = CSMModule(**{**hparams, "also_classes": {}})  # what only served the training is not there
+    module = Describer.of(hparams)
     try:
         weights = load_file(path.with_name(WEIGHTS))
     except (OSError, SafetensorError) as error:

@@ -8,44 +8,28 @@ import lightning as L
 import torch
 from scipy.spatial.transform import Rotation
 from torch import Tensor, nn
-from torch.nn import functional
 from torch.optim import Adam
 from torch.optim.lr_scheduler import CosineAnnealingLR, LRScheduler, OneCycleLR, StepLR
 
 from csm.descriptors import Coordinates
 from csm.errors import ConfigError
+from csm.learning.describer import FORMAT, Describer
 from csm.learning.loss import Products, linear_cross_entropy
-from csm.learning.places import Places
 from csm.learning.samples import NetworkInput, ShapeSample, mirrored_template
-from csm.learning.sides import mended
-from csm.learning.standardisation import Standardisation
-from csm.learning.variation import Variation, image_columns
-from csm.mesh.shape import Mesh
-from csm.networks import Surface, build, stencils_of
 
 Schedule = Literal["constant", "cosine", "step", "drop", "one_cycle"]
 
-FORMAT = 1
-"""Version of the hyper-parameters in a checkpoint."""
 
-
-class CSMModule(L.LightningModule):
+class CSMModule(Describer, L.LightningModule):
     """Learn to classify the template vertex of every vertex of a shape.
 
     All hyper-parameters are plain data, so a checkpoint loads with ``weights_only=True`` and without a config.
 
     Parameters
     ----------
-    network
-        Name of the network and its options, for `csm.networks.build`.
-    in_channels
-        Width of the input descriptor.
-    n_classes
-        Number of template vertices.
-    descriptor
-        Name and parameters of the input descriptor, kept in the checkpoint so that it can be computed for any mesh.
-    basis_k
-        Eigenpairs of the basis that the network was trained with.
+    network, in_channels, n_classes, descriptor, basis_k, standardise, vary, mirror, places, format
+        Of a `Describer`.  With `mirror`, `also_classes` must have the mirrored templates
+        (`csm.learning.samples.also_classes`).
     also_classes
         Number of template points of each further template that training shapes have, by the name of the template.  Each
         has a classifier of its own, which only serves the training.
@@ -60,28 +44,12 @@ class CSMModule(L.LightningModule):
         How many labelled vertices, drawn anew in every training step, the loss is taken over; None for all.  The
         classifier is most of the cost of a step, so 1024 of 6890 make it several times faster; the gradient is that
         of all vertices on average.
-    standardise
-        Give every column of the input mean 0 and deviation 1 over the training shapes, and cut what is more than 10
-        deviations off (`Standardisation`).
-    vary
-        How much every column of the standardised input is scaled and shifted at random in every training step
-        (`Variation`); 0 for not at all.
-    mirror
-        Share of training steps that see the mirror image of their shape, whose input is that of the shape with its
-        columns in another order (`csm.descriptors.base.Descriptor.mirrored_columns`), so that left and right are told
-        apart on bodies that it has not seen.  `also_classes` must have the mirrored templates then
-        (`csm.learning.samples.also_classes`).
-    places
-        Describe a vertex by where on the template the classifier sees it, in this many of the template's
-        eigenfunctions (`Places`); 0: by the network's last layer.
     rotate
         Turn the input features, which must be vertex positions (descriptor "xyz"), by a rotation drawn anew in every
         training step, any as likely as any other, so that the network learns not to depend on how a shape stands.
     training
         How the checkpoint came about (data, split, seed), free plain data for its reader.
     """
-
-    image_columns: Tensor
 
     def __init__(
         self,
@@ -104,32 +72,20 @@ class CSMModule(L.LightningModule):
         training: dict[str, Any] | None = None,
         format: int = FORMAT,
     ) -> None:
-        super().__init__()
+        super().__init__(
+            network,
+            in_channels,
+            n_classes,
+            descriptor,
+            basis_k,
+            standardise=standardise,
+            vary=vary,
+            mirror=mirror,
+            places=places,
+            format=format,
+        )
         self.save_hyperparameters()
-        if format != FORMAT:
-            raise ConfigError(f"the checkpoint has format {format}, this version of csm reads format {FORMAT}")
-        options = dict(network)
-        try:
-            self.network = build(options.pop("name"), in_channels, n_classes, **options)
-        except ValueError as error:
-            raise ConfigError(str(error)) from error
-        wanted = self.network.n_eigenpairs
-        if wanted > basis_k:
-            raise ConfigError(
-                f"the network wants {wanted} eigenpairs, the data hold {basis_k}: set data.basis_k={wanted} or a "
-                "smaller model.ks"
-            )
-        self.has_classifier = True
-        self.inputs = Standardisation(in_channels) if standardise else None
-        self.variation = self._variation(vary, standardise)
-        if mirror and stencils_of(**network):
-            raise ConfigError(
-                f"learning.mirror={mirror}: {network['name']} sees more of a shape than its descriptor, and it is not "
-                "known how that changes when a shape is mirrored; set learning.mirror=0"
-            )
-        self.mirror = mirror
-        self.register_buffer("image_columns", image_columns(mirror, descriptor), persistent=False)
-        self.places = self._places(n_classes, places, basis_k)
+        self.settings = self.hparams
         width = self.network.classifier.in_features
         self.others = nn.ModuleDict({name: nn.Linear(width, n) for name, n in (also_classes or {}).items()})
         self.lr, self.weight_decay, self.schedule = lr, weight_decay, schedule
@@ -143,72 +99,6 @@ class CSMModule(L.LightningModule):
         self.loss_products: Products = loss_products
         self.rotate = rotate
         self.loss_rows = loss_rows
-
-    def forward(self, features: Tensor, surface: Surface) -> Tensor:
-        """Return the network's last layer before the classifier, shape (N, Q)."""
-        x = features if self.inputs is None else self.inputs(features)
-        return self.network.describe(self.variation(x), surface)
-
-    @torch.no_grad()
-    def descriptor(self, last: Tensor, given: NetworkInput, mesh: Mesh | None = None) -> Tensor:
-        """Return the learned descriptor in evaluation mode, shape (N, Q): the network's last layer, or the places.
-
-        Where the twins of the template's points are known, the places are the means of those of the shape and of its
-        mirror image, two opinions that seldom go wrong together.
-
-        Parameters
-        ----------
-        last
-            Shape (N, Q): the network's last layer, as `last_layer` returns it.
-        given
-            The shape.
-        mesh
-            Its mesh, with which parts that are taken for their mirror images are mended (`csm.learning.sides`).
-        """
-        if self.places is None:
-            return last
-        classifier = self.network.classifier
-        if not self.mirror or not self.places.has_twins:
-            plain: Tensor = self.places(last, classifier)
-            return plain
-        columns = self.image_columns.to(given.features.device)
-        image = self.last_layer(given._replace(features=given.features[:, columns]))
-        rows = self._read(last, mesh, image=False) + self._read(image, mesh, image=True)
-        found: Tensor = functional.normalize(rows, dim=1)
-        return found
-
-    def _read(self, last: Tensor, mesh: Mesh | None, *, image: bool) -> Tensor:
-        """Return the places of a shape, of its last layer or of that of its mirror image, before they have length 1."""
-        assert self.places is not None
-        places, classifier = self.places, self.network.classifier
-        found = places.read(last, classifier, twins=image)
-        if mesh is None:
-            return found.rows
-        return mended(found, lambda: places.read(last, classifier, twins=not image), mesh)
-
-    def weights(self) -> dict[str, Tensor]:
-        """Return the tensors that a trained network consists of: those of the network, standardisation and places."""
-        found = dict(self.network.state_dict())
-        for name, part in (("inputs.", self.inputs), ("places.", self.places)):
-            found |= {} if part is None else part.state_dict(prefix=name)
-        return found
-
-    def _variation(self, spread: float, standardise: bool) -> Variation:
-        if spread and not standardise:
-            raise ConfigError(
-                "learning.vary is in deviations of a standardised input: set learning.vary=0 or standardise"
-            )
-        return Variation(spread)
-
-    def _places(self, n_classes: int, k: int, basis_k: int) -> Places | None:
-        if isinstance(k, bool) or not isinstance(k, int):
-            raise ConfigError(f"learning.places={k}; wanted a number of eigenfunctions, or 0 for none")
-        if k > basis_k:
-            raise ConfigError(f"learning.places={k}, and the data hold {basis_k} eigenfunctions: set data.basis_k={k}")
-        try:
-            return Places(n_classes, k) if k else None
-        except ValueError as error:
-            raise ConfigError(f"learning.places: {error}") from error
 
     def loss(self, last: Tensor, sample: ShapeSample) -> Tensor:
         """Cross-entropy of the classifier over the rows with a known template point (in training, a draw of them)."""
@@ -249,19 +139,6 @@ class CSMModule(L.LightningModule):
         last = self(sample.features, sample.surface)
         self.log("val/loss", self.loss(last, sample), prog_bar=True, batch_size=sample.counts, sync_dist=True)
         return self.descriptor(last, NetworkInput(sample.features, sample.surface))
-
-    @torch.no_grad()
-    def describe(self, given: NetworkInput, mesh: Mesh | None = None) -> Tensor:
-        """Return the learned descriptor of a shape in evaluation mode, shape (N, Q), on the device of the module."""
-        return self.descriptor(self.last_layer(given), given, mesh)
-
-    @torch.no_grad()
-    def last_layer(self, given: NetworkInput) -> Tensor:
-        """Return what the classifier takes of a shape, in evaluation mode, on the device of the module."""
-        self.eval()
-        features, surface = given.to(self.device)
-        found: Tensor = self(features, surface)
-        return found
 
     def configure_optimizers(self) -> Any:
         """Adam with the chosen schedule, stepped once per training step."""

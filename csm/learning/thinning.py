@@ -7,11 +7,11 @@ from torch.nn import functional
 
 from csm._types import IntArray
 from csm.errors import ConfigError
-from csm.learning.module import CSMModule
+from csm.learning.describer import Describer
 from csm.learning.places import PARTS
 
 
-def thinned(module: CSMModule, classes: IntArray, functions: int) -> CSMModule:
+def thinned(module: Describer, classes: IntArray, functions: int) -> Describer:
     """Return a network that describes by fewer points of the template, and by fewer of its eigenfunctions.
 
     Neighbouring points say nearly the same, so well-spread ones serve nearly as well as all.  The classifier is nine
@@ -40,7 +40,7 @@ def thinned(module: CSMModule, classes: IntArray, functions: int) -> CSMModule:
     n, k = module.places.functions.shape
     if not 2 <= functions <= k or not 0 < len(set(classes.tolist()) & set(range(n))) == len(classes):
         raise ConfigError(f"wanted some of {n} points of the template, each once, and 2 to {k} of its functions")
-    made = CSMModule(**{**module.hparams, "n_classes": len(classes), "places": functions, "also_classes": {}})
+    made = Describer.of({**module.settings, "n_classes": len(classes), "places": functions, "also_classes": {}})
     kept = torch.as_tensor(classes)
     weights = {name: x for name, x in module.state_dict().items() if not name.startswith("others.")}
     for name in ("network.classifier.weight", "network.classifier.bias", *(f"places.{name}" for name in PARTS)):

@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from csm.learning.module import CSMModule
+from csm.learning.describer import Describer
 from csm.learning.samples import NetworkInput, ShapeSample
 
 LOG = logging.getLogger(__name__)
@@ -30,7 +30,7 @@ NEAR = 0.1
 
 
 @torch.no_grad()
-def learn_twins(module: CSMModule, samples: Sequence[ShapeSample]) -> bool:
+def learn_twins(module: Describer, samples: Sequence[ShapeSample]) -> bool:
     """Find the twins of the template's points, where the template has a left and a right; return whether it has.
 
     Parameters
@@ -66,7 +66,7 @@ def learn_twins(module: CSMModule, samples: Sequence[ShapeSample]) -> bool:
     return True
 
 
-def _places_in_image(module: CSMModule, sample: ShapeSample) -> Tensor:
+def _places_in_image(module: Describer, sample: ShapeSample) -> Tensor:
     """Return where the classifier sees the known points of a shape in its mirror image, shape (R, K)."""
     assert module.places is not None
     image = NetworkInput(sample.features[:, module.image_columns.to(sample.features.device)], sample.surface)

@@ -14,7 +14,7 @@ from csm._counts import counted
 from csm.data.prepare import Recipe, prepare_mesh
 from csm.data.store import Store
 from csm.learning.checkpoint import load_module
-from csm.learning.module import CSMModule
+from csm.learning.describer import Describer
 from csm.learning.samples import network_input, recipe_of
 from csm.matching.base import Classifier, Described
 from csm.matching.methods import Method
@@ -35,13 +35,13 @@ class NetworkMethod(Method):
 
     refine = "trusting"  # a search mends exchanged limbs, but a start that the network is sure of needs none
 
-    def __init__(self, module: CSMModule, name: str = "") -> None:
+    def __init__(self, module: Describer, name: str = "") -> None:
         self.module = module
-        self.training: Mapping[str, Any] = module.hparams.get("training") or {}
+        self.training: Mapping[str, Any] = module.settings.get("training") or {}
         self.name = name or str(self.training.get("name", "network"))
 
     def __repr__(self) -> str:
-        return f"NetworkMethod({self.name!r}, {self.module.hparams['network']['name']})"
+        return f"NetworkMethod({self.name!r}, {self.module.settings['network']['name']})"
 
     @property
     def trained_on(self) -> str:
@@ -61,14 +61,14 @@ class NetworkMethod(Method):
             if name.startswith("others."):
                 continue  # the classifiers of further templates only served the training
             digest.update(name.encode() + tensor.detach().cpu().numpy().tobytes())
-        hparams = self.module.hparams
+        hparams = self.module.settings
         plain = {name: hparams[name] for name in ("network", "descriptor", "basis_k")}
         return {**plain, "weights": digest.hexdigest()}
 
     @cached_property
     def recipe(self) -> Recipe:
         """Input descriptor, basis and stencils."""
-        return recipe_of(self.module.hparams)
+        return recipe_of(self.module.settings)
 
     def describe(self, mesh: Mesh, store: Store, device: str = "cpu") -> Described:
         """Return the learned descriptor of a mesh, computed on the device."""

@@ -54,7 +54,7 @@ def test_a_training_leaves_a_checkpoint_an_export_and_its_numbers(tmp_path):
 
 def test_a_checkpoint_knows_how_it_came_about(tmp_path):
     training = a_training(tmp_path, seed=5)
-    known = load_model(fit(training, tmp_path / "run").checkpoint).module.hparams
+    known = load_model(fit(training, tmp_path / "run").checkpoint).module.settings
     assert known["descriptor"] == record(training.data.recipe.descriptor)
     assert (known["network"], known["basis_k"], known["lr"]) == (NETWORK, 24, 1e-2)
     about = known["training"]
