@@ -7,7 +7,6 @@ import os
 import numpy as np
 
 from csm._counts import counted
-from csm._parallel import thread_map
 from csm._types import Float32Array
 from csm.data.store import Store
 from csm.descriptors.base import Descriptor
@@ -15,7 +14,7 @@ from csm.matching.base import Described, Matcher, require_device
 from csm.matching.both import BothWays, match_both_ways
 from csm.matching.confidence import share_returning
 from csm.matching.maps import VertexMap
-from csm.matching.methods import DescriptorMethod, Method, PrecomputedMethod, as_method
+from csm.matching.methods import Method, PrecomputedMethod, as_method, describe_all
 from csm.matching.nearest import nearest
 from csm.matching.refinement.base import Refined, Refiner
 from csm.matching.registry import matchers as as_matchers
@@ -26,7 +25,6 @@ from csm.matching.subjects import Cleaning, Subject, on_given, subject_of
 from csm.matching.suited import AUTO, suited
 from csm.mesh.debris import body_of
 from csm.mesh.inputs import MeshLike
-from csm.mesh.shape import Mesh
 from csm.mesh.topology import rim
 
 
@@ -88,22 +86,8 @@ def match(
     if chosen is None:
         chosen, why, known = suited(meshes, store, device)
     (rule,) = as_matchers([matcher], [chosen.refine if refine == "auto" else refine])
-    here, there = known or _described(chosen, rule, meshes, store, device)
+    here, there = known or describe_all(chosen, meshes, store, device, embed=isinstance(rule, Refined))
     return match_of(match_both_ways(rule, here, there), subjects, (here, there), chosen, rule, why)
-
-
-def _described(method: Method, rule: Matcher, meshes: list[Mesh], store: Store, device: str) -> list[Described]:
-    """Describe both meshes, and compute the eigenfunctions that a refinement needs, on two threads where that helps."""
-
-    def describe(mesh: Mesh) -> Described:
-        found = method.describe(mesh, store, device)
-        if isinstance(rule, Refined):
-            _ = found.embedded
-        return found
-
-    if not isinstance(method, DescriptorMethod) or meshes[0].digest == meshes[1].digest:
-        return [describe(mesh) for mesh in meshes]
-    return thread_map(describe, meshes)  # the eigensolver leaves the interpreter's lock free for most of its time
 
 
 def match_of(

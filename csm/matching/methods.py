@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import hashlib
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from csm._counts import counted
+from csm._parallel import thread_map
 from csm._places import load
 from csm._types import FloatArray
 from csm.data.prepare import Recipe, features_of
@@ -148,6 +149,36 @@ class PrecomputedMethod(Method):
         import torch
 
         return Described(mesh, torch.as_tensor(found).to(device), store=store)
+
+
+def describe_all(
+    method: Method, meshes: Sequence[Mesh], store: Store, device: str = "cpu", *, embed: bool = False
+) -> list[Described]:
+    """Describe meshes, on several threads where that helps.
+
+    Parameters
+    ----------
+    method
+        What describes them.
+    meshes
+        The meshes; the same one is described once at a time, so that the store has it for the next.
+    store
+        Where what is computed is kept.
+    device
+        Where networks run.
+    embed
+        Compute the eigenfunctions that a refinement needs as well.
+    """
+
+    def describe(mesh: Mesh) -> Described:
+        found = method.describe(mesh, store, device)
+        if embed:
+            _ = found.embedded
+        return found
+
+    if len({mesh.digest for mesh in meshes}) < len(meshes):
+        return [describe(mesh) for mesh in meshes]
+    return thread_map(describe, meshes)  # the eigensolver leaves the interpreter's lock free for most of its time
 
 
 def as_method(method: Method | Descriptor | str) -> Method:

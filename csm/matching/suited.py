@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from csm.data.store import Store
 from csm.matching.base import Described
 from csm.matching.confidence import returning
-from csm.matching.methods import Method, as_method
+from csm.matching.methods import Method, as_method, describe_all
 from csm.mesh.shape import Mesh
 
 AUTO = "auto"
@@ -43,7 +43,7 @@ def suited(meshes: Sequence[Mesh], store: Store, device: str = "cpu") -> tuple[M
         The method, why it was chosen, in words, and the meshes as it describes them, if it is the network.
     """
     network = as_method("humans")
-    described = [network.describe(mesh, store, device) for mesh in meshes]
+    described = describe_all(network, meshes, store, device)
     share = returning(*described)
     why = f"model=auto: {100 * share:.0f} % of the nearest neighbours of the network humans return to their place"
     if share >= KNOWN:

@@ -11,7 +11,8 @@ from csm.data.store import Store
 from csm.descriptors import HKS, preset
 from csm.descriptors.base import record
 from csm.errors import ConfigError, MeshError
-from csm.matching import DescriptorMethod, PrecomputedMethod, as_method
+from csm.matching import DescriptorMethod, PrecomputedMethod, as_method, methods
+from csm.matching.methods import describe_all
 from csm.mesh.shape import Mesh
 from tests.shapes import blob
 
@@ -96,3 +97,18 @@ def test_features_of_half_precision_have_a_key():
     halves = [torch.arange(6, dtype=torch.bfloat16).reshape(3, 2) + i for i in range(2)]
     first, second = (PrecomputedMethod({"a": half}).key for half in halves)
     assert first != second
+
+
+def test_meshes_are_described_side_by_side_as_one_after_the_other(tmp_path):
+    meshes, method = [blob(2, seed) for seed in (1, 2)], as_method("acd")
+    found = describe_all(method, meshes, Store(tmp_path / "a"), embed=True)
+    for mesh, each in zip(meshes, found, strict=True):
+        alone = method.describe(mesh, Store(tmp_path / "b"))
+        np.testing.assert_allclose(each.values, alone.values, rtol=1e-6, atol=1e-9)
+        assert "embedded" in vars(each)
+
+
+def test_the_same_mesh_twice_is_computed_once(tmp_path, monkeypatch):
+    monkeypatch.setattr(methods, "thread_map", lambda *_: pytest.fail("two threads would compute it twice"))
+    found = describe_all(as_method(CHEAP), [blob(2), blob(2)], Store(tmp_path))
+    np.testing.assert_array_equal(found[0].values, found[1].values)
