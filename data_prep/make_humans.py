@@ -1,6 +1,7 @@
 """Make the built-in humans, csm/assets/humans.npz: 10 people x 10 poses, one connectivity.
 
-Needs `pip install "csm[prep]"` (anny).  The result depends on the seed and on the versions of anny and torch only.
+Needs `pip install "csm-correspondence[prep]"` (anny).  The result depends on the seed and on the
+versions of anny and torch only.
 
     python data_prep/make_humans.py --out csm/assets/humans.npz
 """

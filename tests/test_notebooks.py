@@ -22,8 +22,8 @@ def test_they_are_kept_without_outputs():
 @pytest.mark.long
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_they_run(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    nbformat = pytest.importorskip("nbformat", reason='needs pip install "csm[notebooks]"')
-    nbclient = pytest.importorskip("nbclient", reason='needs pip install "csm[notebooks]"')
+    nbformat = pytest.importorskip("nbformat", reason='needs pip install "csm-correspondence[notebooks]"')
+    nbclient = pytest.importorskip("nbclient", reason='needs pip install "csm-correspondence[notebooks]"')
     monkeypatch.setenv("CSM_CACHE", str(tmp_path / "store"))
     book = nbformat.read(path, as_version=4)
     nbclient.NotebookClient(book, timeout=1200, resources={"metadata": {"path": str(tmp_path)}}).execute()

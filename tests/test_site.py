@@ -56,7 +56,7 @@ def test_data_sets_are_listed_where_the_page_asks_for_them(pages):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(importlib.util.find_spec("mkdocs") is None, reason='needs pip install "csm[docs]"')
+@pytest.mark.skipif(importlib.util.find_spec("mkdocs") is None, reason='needs pip install "csm-correspondence[docs]"')
 def test_the_site_builds_without_a_warning(tmp_path):
     build = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path)]
     done = subprocess.run(

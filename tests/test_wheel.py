@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import email
+import importlib.util
 import json
 import os
+import re
 import subprocess
 import sys
 import sysconfig
+import tarfile
 import venv
 import zipfile
 from pathlib import Path
@@ -43,11 +47,16 @@ def run(*words: object, cwd: Path, **variables: str) -> str:
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder with the wheel and the source archive."""
     folder = tmp_path_factory.mktemp("dist")
-    run(sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", folder, ROOT, cwd=folder)
-    (built,) = folder.glob("*.whl")
-    return built
+    run(sys.executable, "-m", "build", "--wheel", "--sdist", "--no-isolation", "--outdir", folder, ROOT, cwd=folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def wheel(built: Path) -> Path:
+    return built / f"csm_correspondence-{csm.__version__}-py3-none-any.whl"
 
 
 class Installed:
@@ -88,6 +97,36 @@ def test_the_wheel_carries_configurations_assets_and_the_type_marker(wheel):
     assert not [
         name for name in inside if name.split("/")[0] not in ("csm", wheel.stem.rsplit("-", 3)[0] + ".dist-info")
     ]
+
+
+def test_the_wheel_has_the_name_on_the_package_index_and_the_command_csm(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        info = f"csm_correspondence-{csm.__version__}.dist-info"
+        metadata = email.message_from_bytes(archive.read(f"{info}/METADATA"))
+        assert metadata["Name"] == "csm-correspondence"
+        assert metadata["Version"] == csm.__version__
+        assert {"prep", "sweep", "viz", "dev"} <= set(metadata.get_all("Provides-Extra"))
+        assert "csm = csm.commands.main:main" in archive.read(f"{info}/entry_points.txt").decode()
+        assert f"{info}/licenses/LICENSE" in archive.namelist()
+
+
+def test_the_source_archive_has_what_tests_and_pages_need(built):
+    top = f"csm_correspondence-{csm.__version__}"
+    with tarfile.open(built / f"{top}.tar.gz") as archive:
+        inside = {name.removeprefix(f"{top}/") for name in archive.getnames()}
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    linked = set(re.findall(r"\]\((?!https?:|#)([^)#]+)\)", readme))
+    needed = {"pyproject.toml", "constraints.txt", "mkdocs.yml", "Makefile", ".github/workflows/ci.yml", "SECURITY.md"}
+    assert (needed | {link for link in linked if (ROOT / link).is_file()}) - inside == set()
+    for folder in ("csm", "conf", "tests", "packaging", "results"):
+        found = {p.relative_to(ROOT).as_posix() for p in (ROOT / folder).rglob("*.[pjymc]*") if p.is_file()}
+        assert {name for name in found - inside if not name.endswith(".pyc")} == set()
+    assert not [name for name in inside if "__pycache__" in name or name.startswith(("outputs", "build", ".venv"))]
+
+
+@pytest.mark.skipif(importlib.util.find_spec("twine") is None, reason="twine is not installed: pip install twine")
+def test_the_package_index_would_take_both(built):
+    run(sys.executable, "-m", "twine", "check", "--strict", *built.iterdir(), cwd=built)
 
 
 def test_the_installed_csm_is_not_the_checkout(installed):

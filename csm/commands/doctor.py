@@ -20,13 +20,12 @@ from packaging.requirements import Requirement
 from threadpoolctl import threadpool_info
 
 from csm._counts import counted
+from csm._extras import DISTRIBUTION, install_line
 from csm.commands.app import command
 from csm.data.registry import find_sets
 from csm.data.store import Store
 from csm.evaluation.provenance import provenance
 from csm.matching.shipped import shipped_models
-
-DISTRIBUTION = "csm"
 
 _IN_WORDS = {
     "viz": "windows with meshes",
@@ -41,12 +40,15 @@ _IN_WORDS = {
     "dev": "work on csm itself",
 }
 
+_NOT_INSTALLED = f"not known: csm runs from a source tree in which {DISTRIBUTION} is not installed (pip install -e .)"
+
 
 def run(cfg: DictConfig) -> dict[str, Any]:
     """Print what was found; return the numbers of data sets and missing libraries."""
     import numpy  # noqa: F401 - its BLAS is listed once it is loaded
 
-    missing = missing_of(metadata.requires(DISTRIBUTION) or [])
+    requirements = installed_requirements()
+    missing = missing_of(requirements or [])
     sets = data_sets(cfg.folder)
     rows = [
         ("machine", f"{platform.platform()}, {counted(os.cpu_count() or 1, 'core')}, {memory()}"),
@@ -60,10 +62,19 @@ def run(cfg: DictConfig) -> dict[str, Any]:
             "; ".join(sets) or "none found: set CSM_DATA, or folder=FOLDER (csm check FOLDER looks into one)",
         ),
         *(("extra " + name, text) for name, text in extras(missing).items()),
+        *([("extras", _NOT_INSTALLED)] if requirements is None else []),
     ]
     width = max(len(name) for name, _ in rows)
     print("\n".join(f"{name:<{width}}  {text}" for name, text in rows))
     return {"data_sets": len(sets), "missing": sum(len(names) for names in missing.values())}
+
+
+def installed_requirements() -> list[str] | None:
+    """Return the requirements of the installed csm, or None where it runs from a source tree that is not installed."""
+    try:
+        return metadata.requires(DISTRIBUTION) or []
+    except metadata.PackageNotFoundError:
+        return None
 
 
 def missing_of(requirements: list[str]) -> dict[str, list[str]]:
@@ -101,7 +112,7 @@ def extras(missing: Mapping[str, list[str]]) -> dict[str, str]:
     """Return extra -> what it is for and whether it is there, in words."""
     return {
         name: f"{_IN_WORDS.get(name, '')}: "
-        + (f'not installed ({", ".join(names)}): pip install "{DISTRIBUTION}[{name}]"' if names else "installed")
+        + (f"not installed ({', '.join(names)}): {install_line(name)}" if names else "installed")
         for name, names in missing.items()
     }
 

@@ -19,6 +19,7 @@ from omegaconf.errors import (
     OmegaConfBaseException,
 )
 
+from csm._extras import install_line
 from csm.commands.choices import config_folder, options_of
 from csm.commands.words import nearest_names
 from csm.errors import CsmError
@@ -118,7 +119,7 @@ def _missing_option(error: MissingConfigException) -> str:
 
 
 def _extra(name: str, wanted: str = "") -> str:
-    return f"{wanted or name} needs an extra that is not installed: pip install 'csm[{_EXTRAS[name]}]'"
+    return f"{wanted or name} needs an extra that is not installed: {install_line(_EXTRAS[name])}"
 
 
 def _not_made(error: InstantiationException) -> str | None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from csm._extras import install_line
 from csm._progress import progress_bar
 from csm._types import Arrays, IntArray
 from csm.data.humans import HumansSet
@@ -198,7 +199,7 @@ def _versions(methods: Sequence[str]) -> list[str]:
 
 def _missing(package: str) -> str:
     name = DISTRIBUTIONS.get(package, package)
-    return f"{name} is not installed, so its rows are left out (pip install csm[peers])."
+    return f"{name} is not installed, so its rows are left out ({install_line('peers')})."
 
 
 def _cost(runs: Sequence[Arrays]) -> dict[str, float]:

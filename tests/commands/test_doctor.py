@@ -1,7 +1,10 @@
 from __future__ import annotations
 
+from importlib import metadata
+
 import pytest
 
+from csm.commands import doctor
 from csm.commands.doctor import extras, missing_of, store_in_words
 from csm.data.store import Store
 from tests.shapes import blob
@@ -37,7 +40,27 @@ def test_extras_are_told_from_requirements_and_from_other_markers():
     assert found == {"there": [], "gone": ["nothing-of-this-name>=2", "numpy>=900"]}
     words = extras(found)
     assert words["there"].endswith("installed")
-    assert 'not installed (nothing-of-this-name>=2, numpy>=900): pip install "csm[gone]"' in words["gone"]
+    assert (
+        'not installed (nothing-of-this-name>=2, numpy>=900): pip install "csm-correspondence[gone]"' in words["gone"]
+    )
+
+
+def test_a_source_tree_that_is_not_installed_is_told_so(csm, tmp_path, monkeypatch):
+    def not_installed(name):
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(doctor.metadata, "requires", not_installed)
+    status, out, _ = csm("doctor", f"folder={tmp_path}")
+    assert status == 0
+    assert "runs from a source tree in which csm-correspondence is not installed" in out
+    assert "extra dev" not in out
+
+
+def test_extras_are_those_of_the_distribution_on_the_package_index(csm, tmp_path, monkeypatch):
+    wanted = {"csm-correspondence": ["nothing-of-this-name; extra == 'odd'"]}
+    monkeypatch.setattr(doctor.metadata, "requires", wanted.__getitem__)
+    out = csm("doctor", f"folder={tmp_path}")[1]
+    assert 'not installed (nothing-of-this-name): pip install "csm-correspondence[odd]"' in out
 
 
 def test_the_store_is_counted(tmp_path):

@@ -28,9 +28,9 @@ MISSING = [name for name, library in LAUNCHERS.items() if importlib.util.find_sp
         ("descriptor=adc", "descriptor=adc: there is no such option; did you mean"),
         ("experiment=human", "did you mean humans"),
         ("descriptor=null", "a group takes the name of one of its options"),
-        *((f"hydra/launcher={name}", "pip install 'csm[sweep]'") for name in MISSING),
+        *((f"hydra/launcher={name}", 'pip install "csm-correspondence[sweep]"') for name in MISSING),
         *[("hydra/launcher=ray_cluster", "hydra/launcher=ray needs an extra")] * ("ray" in MISSING),
-        ("hydra/sweeper=optuna", "pip install 'csm[sweep]'"),
+        ("hydra/sweeper=optuna", 'pip install "csm-correspondence[sweep]"'),
         ("~foo", "~foo: there is no such key to leave out"),
         ("seed==1", "'seed==1' is not of the form key=value"),
         ("seed=[1", "not of the form key=value"),
@@ -71,7 +71,7 @@ def test_the_operating_system_is_put_into_words(number, said):
 
 
 def test_missing_extras_and_memory_are_named():
-    assert "csm[viz]" in str(explained(ModuleNotFoundError("No module", name="polyscope"), "match"))
+    assert "csm-correspondence[viz]" in str(explained(ModuleNotFoundError("No module", name="polyscope"), "match"))
     assert "not enough memory" in str(explained(MemoryError("8 GiB"), "match"))
     assert "no graphics card" in str(explained(RuntimeError("Found no NVIDIA driver on your system"), "match"))
 

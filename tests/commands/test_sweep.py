@@ -114,7 +114,7 @@ def test_a_preparation_is_shared_by_the_jobs_of_every_launcher(tmp_path, launche
 
 
 @pytest.mark.long
-@pytest.mark.skipif(not importlib.util.find_spec("ray"), reason="needs Ray: pip install 'csm[sweep]'")
+@pytest.mark.skipif(not importlib.util.find_spec("ray"), reason='needs Ray: pip install "csm-correspondence[sweep]"')
 def test_a_training_whose_worker_is_killed_ends_as_if_it_had_not_been(tmp_path):
     kill = f"+callbacks.kill={{_target_: tests.commands.killing.KillOnce, epoch: 3, flag: '{tmp_path}/killed'}}"
     words = (*NETWORK, "trainer.max_epochs=5", "metric.points=9", "logger=none", "hydra.sweep.dir=s", kill)

@@ -7,5 +7,5 @@ import importlib.util
 import pytest
 
 needs_anny = pytest.mark.skipif(
-    importlib.util.find_spec("anny") is None, reason='anny is not installed: pip install "csm[prep]"'
+    importlib.util.find_spec("anny") is None, reason='anny is not installed: pip install "csm-correspondence[prep]"'
 )

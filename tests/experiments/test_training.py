@@ -216,7 +216,7 @@ def test_a_logger_whose_library_is_missing_is_said_in_a_sentence(tmp_path):
 
 @pytest.mark.parametrize("name", ["wandb", "mlflow"])
 def test_other_loggers_write_on_this_machine(tmp_path, monkeypatch, name):
-    pytest.importorskip(name, reason=f'needs pip install "csm[{name}]"')
+    pytest.importorskip(name, reason=f'needs pip install "csm-correspondence[{name}]"')
     monkeypatch.chdir(tmp_path)
     logger = instantiate(OmegaConf.load(config_folder() / "logger" / f"{name}.yaml"), _partial_=True)
     fit(a_training(tmp_path, logger=logger), tmp_path / "run")

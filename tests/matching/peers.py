@@ -12,7 +12,7 @@ from scipy import sparse
 from csm.mesh.shape import Mesh
 from csm.operators import Spectrum
 
-_WHY = "compares with pyFM and geomfum, which are not installed: pip install csm[peers]"
+_WHY = 'compares with pyFM and geomfum, which are not installed: pip install "csm-correspondence[peers]"'
 
 
 def need(module: str) -> Any:

@@ -47,7 +47,7 @@ def test_csm_maps_the_source_to_the_target_and_its_cost_is_measured(pair, name):
 @pytest.mark.parametrize("name", [name for name, found in COMPETITORS.items() if found.package != "csm"])
 def test_the_others_map_the_source_to_the_target(pair, name):
     if not COMPETITORS[name].installed:
-        pytest.skip("compares with pyFM and geomfum, which are not installed: pip install csm[peers]")
+        pytest.skip('compares with pyFM and geomfum, which are not installed: pip install "csm-correspondence[peers]"')
     (vertices, faces), target, truth = pair
     found = measure_here(name, (100 * vertices + 3, faces), target)
     off = np.linalg.norm(target[0][found["indices"]] - target[0][truth], axis=1)

@@ -107,7 +107,7 @@ def test_without_the_others_csm_is_measured_alone_and_one_sentence_says_so(conte
     findings = run(context, methods=("acd", "pyfm", "pyfm_readme"))
     assert [row["name"] for row in findings.rows] == ["acd"]
     assert [note for note in findings.notes if "not installed" in note] == [findings.notes[-1]]
-    assert "pip install csm[peers]" in caplog.text
+    assert 'pip install "csm-correspondence[peers]"' in caplog.text
     with pytest.raises(ConfigError, match="none of the methods can run"):
         run(context, methods=("pyfm",))
 

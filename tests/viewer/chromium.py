@@ -44,7 +44,7 @@ def find_browser() -> str | None:
 @contextmanager
 def chromium() -> Iterator[Any]:
     """Start the browser, or skip the test that wants it."""
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: csm[browser] has it")
+    playwright = pytest.importorskip("playwright.sync_api", reason='needs pip install "csm-correspondence[browser]"')
     program = find_browser()
     if program is None:
         pytest.skip("there is no Chromium or Chrome on the PATH, and CSM_CHROMIUM names none")

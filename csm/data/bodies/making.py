@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from csm._extras import install_line
 from csm._types import FloatArray, IntArray
 from csm.data.bodies.drawing import Person, draw_person, draw_pose
 from csm.data.bodies.rig import Pose, Rig, pose_matrices
@@ -40,7 +41,7 @@ def require_anny() -> None:
     try:
         found = version("anny")
     except PackageNotFoundError as error:
-        raise ConfigError('bodies are made with anny, which is not installed: pip install "csm[prep]"') from error
+        raise ConfigError(f"bodies are made with anny, which is not installed: {install_line('prep')}") from error
     if found != VERSION:
         raise ConfigError(f"bodies are made with anny {VERSION}, here is {found}: pip install anny=={VERSION}")
 

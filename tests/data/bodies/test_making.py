@@ -18,7 +18,7 @@ def test_a_missing_model_or_another_version_is_said_in_a_sentence(monkeypatch):
         raise making.PackageNotFoundError
 
     monkeypatch.setattr(making, "version", missing)
-    with pytest.raises(ConfigError, match=r'not installed: pip install "csm\[prep\]"'):
+    with pytest.raises(ConfigError, match=r'not installed: pip install "csm-correspondence\[prep\]"'):
         require_anny()
     monkeypatch.setattr(making, "version", lambda _name: "0.1")
     with pytest.raises(ConfigError, match=r"anny 0.6.2, here is 0.1"):
