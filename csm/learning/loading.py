@@ -93,8 +93,8 @@ UNSEEN, FITTED = "val", "fit"
 """What the metrics of validation shapes are called by: shapes that are held out of the fit, and those that are not."""
 
 
-def metric_group(trainer: L.Trainer) -> str:
-    """Return `FITTED` if the validation shapes of a training are also fitted, else `UNSEEN`."""
+def metric_group(trainer: L.Trainer | None) -> str:
+    """Return `FITTED` if the validation shapes of a training are also fitted; else, or without one, `UNSEEN`."""
     loaded = getattr(trainer, "datamodule", None)
     return FITTED if isinstance(loaded, LightningData) and not loaded.data.validates_unseen else UNSEEN
 

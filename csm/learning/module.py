@@ -248,7 +248,7 @@ class CSMModule(L.LightningModule):
     def validation_step(self, sample: ShapeSample) -> Tensor:
         """Return the learned descriptor of one shape; the loss is logged, the errors are a callback's business."""
         last = self(sample.features, sample.surface)
-        name = f"{metric_group(self.trainer)}/loss"
+        name = f"{metric_group(self._trainer)}/loss"
         self.log(name, self.loss(last, sample), prog_bar=True, batch_size=sample.counts, sync_dist=True)
         return self.descriptor(last, NetworkInput(sample.features, sample.surface))
 
