@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
+from csm._counts import counted
 from csm._types import FloatArray
 from csm.evaluation.engine import evaluate
 from csm.evaluation.results import PairRow
@@ -48,6 +49,15 @@ def pairs_table(tested: Tested) -> Table:
     unit = f"errors in thousandths of the {tested.evaluation.protocol.normaliser}"
     columns = ("source", "target", "mean error", "95 % within", "exact", "left-right flips")
     return Table(columns, lines, f"{tested.label}. {shown}, the worst first; {unit}.")
+
+
+def worst_line(tested: Tested) -> str:
+    """Name the worst pair of a test set in a line."""
+    rows = worst_first(tested)
+    worst, unit = rows[0], f"thousandths of the {tested.evaluation.protocol.normaliser}"
+    flips = f", {100 * worst.flip:.0f} % of its points left-right flipped" if worst.flip else ""
+    pair = f"{worst.source} to {worst.target} with {1000 * worst.age:.1f} {unit}{flips}"
+    return f"worst of {counted(len(rows), 'pair')} of {tested.label}: {pair}"
 
 
 def common_view(tested: Tested) -> View:

@@ -178,6 +178,40 @@ def losses_figure(curves: Mapping[str, Sequence[float]]) -> Figure:
     return figure
 
 
+def training_figure(curves: Mapping[str, Sequence[tuple[int, float]]]) -> Figure:
+    """Plot how a training went: losses on the left, and on the right the errors on validation shapes, if there are any.
+
+    Parameters
+    ----------
+    curves
+        Name, such as "train/loss" or "val/age" -> epochs, counted from 1, and the values after them.  Mean errors and
+        rates are fractions.
+
+    Raises
+    ------
+    ConfigError
+        If there is no curve.
+    """
+    losses = {name: curve for name, curve in curves.items() if name.endswith("/loss")}
+    panels = [part for part in (losses, {n: c for n, c in curves.items() if n not in losses}) if part]
+    if not panels:
+        raise ConfigError("training figure: wanted at least one curve")
+    figure = Figure(figsize=(4.6 * len(panels), 3.3), layout="constrained")
+    FigureCanvasAgg(figure)
+    for axes, part in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
+        for k, (name, curve) in enumerate(part.items()):
+            epochs, values = zip(*curve, strict=True)
+            axes.plot(epochs, values, marker="o", markersize=3, label=name, **line_style(k))
+        axes.set_xlabel("epoch", fontsize=9)
+        axes.set_ylabel("loss" if part is losses else "fraction (age: of the diameter)", fontsize=9)
+        axes.set_yscale("log" if part is losses else "linear")
+        axes.set_ylim(bottom=None if part is losses else 0)
+        axes.legend(frameon=False, fontsize=8)
+        axes.xaxis.get_major_locator().set_params(integer=True)
+        plain_axes(axes)
+    return figure
+
+
 def reliability_figure(curves: Mapping[str, Sequence[tuple[float, float, int]]]) -> Figure:
     """Plot how often matches are right over how confident csm was, with a line per kind of map.
 

@@ -16,6 +16,7 @@ from csm.experiments.pairs import (
     spread,
     vertex_errors,
     worst_first,
+    worst_line,
     worst_viewers,
     write_pairs,
 )
@@ -51,6 +52,15 @@ def test_the_table_begins_with_the_worst_pair(tested: Tested) -> None:
     errors = [float(str(line[2])) for line in table.rows]
     assert errors == sorted(errors, reverse=True)
     assert errors[0] == pytest.approx(1000 * rows[0].age, abs=0.06)
+
+
+def test_the_worst_pair_is_said_in_a_line(tested: Tested) -> None:
+    worst = worst_first(tested)[0]
+    said = worst_line(tested)
+    assert said.startswith(
+        f"worst of {len(tested.evaluation.rows)} pairs of toys: {worst.source} to {worst.target} with "
+    )
+    assert said.endswith(f"{1000 * worst.age:.1f} thousandths of the sqrt_area")
 
 
 def test_errors_of_a_pair_are_heat_distances_at_every_vertex(tested: Tested) -> None:
