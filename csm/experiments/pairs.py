@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -61,9 +62,13 @@ def worst_line(tested: Tested) -> str:
 
 
 def common_view(tested: Tested) -> View:
-    """Look at a set with the axis up that is longest in most of its shapes; arms spread wide mislead only one."""
-    axes = Counter(guess_up(tested.shapes.load(name).mesh) for name in tested.names)
-    ((most_common, _),) = axes.most_common(1)
+    """Look at the shapes of a test set as `view_of_most` does."""
+    return view_of_most(tested.shapes.load(name).mesh for name in tested.names)
+
+
+def view_of_most(meshes: Iterable[Mesh]) -> View:
+    """Look at meshes with the axis up that is longest in most of them; arms spread wide mislead only one."""
+    ((most_common, _),) = Counter(map(guess_up, meshes)).most_common(1)
     return View(up=most_common)
 
 

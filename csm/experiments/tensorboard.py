@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from torch.utils.tensorboard.summary import hparams
 
 from csm.experiments.callbacks import ValidationErrors
+from csm.experiments.pairs import view_of_most
 from csm.learning.loading import FITTED, LightningData, metric_group
 from csm.learning.module import CSMModule
 from csm.learning.samples import NetworkInput
@@ -109,7 +110,8 @@ def _map(loaded: LightningData, module: CSMModule) -> Figure:
     samples = [loaded.sample(name) for name in names]
     here, there = (module.describe(NetworkInput(sample.features, sample.surface)) for sample in samples)
     source, target = (loaded.data.shape(name).mesh for name in names)
-    return correspondence_figure(source, target, nearest(here, there))
+    view = view_of_most(loaded.data.shape(name).mesh for name in loaded.data.train_names())
+    return correspondence_figure(source, target, nearest(here, there), view=view)
 
 
 def _filters(loaded: LightningData, module: CSMModule) -> dict[str, Figure]:

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import LogFormatter
 
 from csm._types import FloatArray
 from csm.errors import ConfigError
@@ -204,8 +205,12 @@ def training_figure(curves: Mapping[str, Sequence[tuple[int, float]]]) -> Figure
             axes.plot(epochs, values, marker="o", markersize=3, label=name, **line_style(k))
         axes.set_xlabel("epoch", fontsize=9)
         axes.set_ylabel("loss" if part is losses else "fraction (age: of the diameter)", fontsize=9)
-        axes.set_yscale("log" if part is losses else "linear")
-        axes.set_ylim(bottom=None if part is losses else 0)
+        if part is losses:
+            axes.set_yscale("log")
+            axes.yaxis.set_major_formatter(LogFormatter(labelOnlyBase=False))  # 8, not 8 times a power of ten
+            axes.yaxis.set_minor_formatter(LogFormatter(labelOnlyBase=False, minor_thresholds=(1, 0.4)))
+        else:
+            axes.set_ylim(bottom=0)
         axes.legend(frameon=False, fontsize=8)
         axes.xaxis.get_major_locator().set_params(integer=True)
         plain_axes(axes)

@@ -136,16 +136,17 @@ def _gain_bands(axes: Axes, x: FloatArray, sizes: FloatArray) -> None:
     axes.fill_between(x, low, high, color=CYCLE[0], alpha=0.18, linewidth=0, label="nine tenths")
     axes.fill_between(x, lower, upper, color=CYCLE[0], alpha=0.35, linewidth=0, label="middle half")
     axes.plot(x, middle, color=CYCLE[0], linewidth=1.8, label="median")
-    axes.set_ylim(bottom=0)
+    axes.set_ylim(0, 1.15 * max(float(high.max()), 1e-9))  # leaves room for the legend
     axes.legend(frameon=False, fontsize=7, ncols=3, loc="upper center")
 
 
 def _strongest(axes: Axes, x: FloatArray, filters: FloatArray, shape: tuple[int, ...], count: int) -> None:
     """Draw the columns with the greatest root mean square of filters, shape (K, C); the legend has their channels."""
     order = np.argsort(-np.mean(filters**2, axis=0), kind="stable")[:count]
-    for color, column in zip(colormaps["turbo"](np.linspace(0.05, 0.95, len(order))), order, strict=True):
+    colors = colormaps["turbo"](np.linspace(0.05, 0.95, len(order)))
+    for k, column in enumerate(order):
         label = " → ".join(str(i) for i in np.unravel_index(column, shape))
-        axes.plot(x, filters[:, column], color=color, linewidth=1.2, label=label)
+        axes.plot(x, filters[:, column], color=colors[k], linestyle="-" if k % 2 else "--", linewidth=1.2, label=label)
     axes.axhline(0, color="0.3", linewidth=0.8)
     title = "channel" if len(shape) == 1 else "channel in → out"
     axes.legend(frameon=False, fontsize=7, title_fontsize=7, ncols=4, title=title, loc="upper center",

@@ -15,6 +15,7 @@ from csm.experiments.pairs import (
     pairs_table,
     spread,
     vertex_errors,
+    view_of_most,
     worst_first,
     worst_line,
     worst_viewers,
@@ -24,6 +25,7 @@ from csm.experiments.testing import measure_set
 from csm.learning.loading import LightningData
 from csm.matching.nearest import nearest
 from csm.matching.network import NetworkMethod
+from csm.mesh.shape import Mesh
 from csm.operators.geodesic import geodesics
 from tests.learning.toys import make
 from tests.shapes import sphere
@@ -116,3 +118,10 @@ def test_values_are_spread_to_what_is_near_and_not_further() -> None:
     assert np.isnan(filled[up < -0.5]).all()
     nothing = np.full(mesh.n_vertices, np.nan)
     np.testing.assert_array_equal(spread(mesh, nothing), nothing)
+
+
+def test_one_shape_with_its_arms_spread_wide_lies_down_alone() -> None:
+    ball = sphere(1)
+    tall, wide = (Mesh(ball.vertices * scale, ball.faces) for scale in ((1, 1, 3), (4, 1, 3)))
+    assert view_of_most([wide, tall, tall]) == view_of_most([tall])
+    assert view_of_most([wide]) != view_of_most([tall])
