@@ -49,7 +49,7 @@ class TensorBoardPanels(L.Callback):
             return
         self._drawn, settings = None, flatten(self.hparams)
         logger.log_hyperparams(settings, {})  # with numbers, they would be the first points of its curves
-        for summary in hparams(settings, {f"hp/{name}": 0.0 for name in _results(trainer)}):
+        for summary in hparams(settings, {f"hp/{name}": 0.0 for name in _results(trainer)}):  # type: ignore[no-untyped-call]
             logger.experiment._get_file_writer().add_summary(summary)
         if data is not None:
             errors = _errors(trainer)
