@@ -16,6 +16,21 @@ _ITEM = re.compile(
 )
 _WIDTH = 110
 
+SETTINGS = {
+    "train": {
+        "data.root=FOLDER": "of the meshes, or of the data sets below which the set is; the built-in humans need none",
+        "data.split=NAME": "which shapes train, validate and test: one of the set's splits, or a json file of your own",
+        "data.holdout=10": "validate on this many training shapes, the last ones, which are then not fitted",
+        "data.also=[remeshed_5000]": "more training shapes: with other triangles, bodies.npz of csm bodies, or humans",
+        "data.test=[remeshed_5000]": "sets to test on, by their names; data.test_roots=[FOLDER] with data=folder",
+        "data.basis_k=128": "eigenpairs that are kept of each shape",
+        "trainer.max_epochs=50": "how often all training shapes are gone through",
+        "trainer.max_time=00:01:00:00": "days:hours:minutes:seconds after which it ends, whatever the epoch",
+        "trainer.check_val_every_n_epoch=5": "epochs from one validation, and its printed numbers, to the next",
+    }
+}
+"""Commands -> settings of groups with several options that are changed most, each with an example, and what they do."""
+
 
 @dataclass
 class Page:
@@ -74,6 +89,9 @@ def help_text(command: str) -> str:
             continue
         rows = [(f"{group}.{key}={value}", text) for key, value, text in _settings(group, choice)]
         lines += ["", f"settings of the group {group}:", *_table(rows)] if rows else []
+    if command in SETTINGS:
+        lines += ["", "settings of data and trainer that are changed most (these are examples):"]
+        lines += _table(list(SETTINGS[command].items()))
     groups = [row for row in page.groups if len(options_of(row[0])) > 1 and not row[0].startswith("hydra")]
     if groups:
         lines += ["", "groups, of which one option each is chosen as GROUP=OPTION:"]

@@ -24,12 +24,14 @@ from csm.commands.processes import is_first, processes_to_start, train_together
 from csm.data.inspection import require_sound
 from csm.errors import ConfigError
 from csm.evaluation.tables import markdown_table
+from csm.experiments.pairs import worst_line
 from csm.experiments.ranks import NAME, part
-from csm.experiments.report import write_results
+from csm.experiments.report import training_section, write_results
 from csm.experiments.testing import Tested, measure_all, numbers
 from csm.experiments.training import Training, fit
 from csm.matching.base import require_device
 from csm.matching.network import NetworkMethod
+from csm.viewer.html import Section
 
 register("data", "descriptor", "model")
 
@@ -55,13 +57,14 @@ def run(cfg: DictConfig) -> dict[str, Any] | None:
         part()
     if trained.rank:
         return None
-    print(f"trained for {trained.seconds / 60:.1f} minutes: {trained.checkpoint}")
-    found = {"seconds": trained.seconds, "checkpoint": str(trained.checkpoint), **trained.measured}
+    about = {"seconds": trained.seconds, "parameters": trained.parameters, "checkpoint": str(trained.checkpoint)}
+    print(f"trained for {trained.seconds / 60:.1f} minutes, {trained.parameters:,} parameters: {trained.checkpoint}")
+    found = {**about, **trained.measured}
     if not cfg.test:
         return found
     method = NetworkMethod(trained.module)
     tested = measure_all(method, training.data, protocol, matching=matching, table=cfg.table, device=cfg.device)
-    conclude(cfg, tested, f"{training.name}: {method.training.get('protocol')}.")
+    conclude(cfg, tested, f"{training.name}: {method.training.get('protocol')}.", [training_section(trained)])
     if training.logger is not None:
         print(f"log:          {folder}  (tensorboard --logdir {folder})")
     return found | numbers(tested)
@@ -115,11 +118,12 @@ def require_network_of_recipe(cfg: DictConfig, overrides: Sequence[str]) -> None
         )
 
 
-def conclude(cfg: DictConfig, tested: list[Tested], notes: str) -> None:
-    """Keep the results of a test in the folder of the job, and print the table and where things are."""
+def conclude(cfg: DictConfig, tested: list[Tested], notes: str, more: Sequence[Section] = ()) -> None:
+    """Keep the results of a test in the folder of the job, and print the table, the worst pairs and where all is."""
     folder = output_folder()
-    page = write_results(tested, folder, cfg.results, notes)
+    page = write_results(tested, folder, cfg.results, notes, more)
     print(markdown_table([t.row for t in tested]))
+    print(*map(worst_line, tested), sep="\n")
     print(f"table:        {folder / 'rows.json'}, rows.csv\nreport:       {page}")
 
 

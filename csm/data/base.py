@@ -38,9 +38,9 @@ class DataModule:
     basis_k
         Eigenpairs kept per shape; a network may use fewer.
     holdout
-        How many shapes, the last of the training list, are held out of the fit to validate on.  With 0 the last ten
-        training shapes serve for validation although they are fitted, and the validation error says little more than
-        that the training runs.
+        How many shapes, the last of the training list, are held out of the fit to validate on.  With 0 these are the
+        validation shapes of the split.  Where it names none, the last ten training shapes are looked at although they
+        are fitted: their error says little more than that the training runs, and is called so (`validates_unseen`).
     store
         Where features and bases are kept.
     workers
@@ -80,23 +80,39 @@ class DataModule:
         self.recipe = Recipe(descriptor, basis_k, tuple(stencils))
         self.store = store or Store()
         self.fit_names, held_out = split.held_out(holdout)
-        self.validation_names = held_out or split.train[-10:]
+        self.validation_names = held_out or split.validation or split.train[-10:]
         self.also = tuple(additional(text, self.train_set, self.fit_names, self.store) for text in also)
         self._shapes: dict[str, Shape] = {}
 
     @property
+    def validates_unseen(self) -> bool:
+        """Whether no validation shape is fitted, nor an additional one of the same name."""
+        fitted = {*self.fit_names, *(name for more in self.also for name in more.names)}
+        return fitted.isdisjoint(self.validation_names)
+
+    @property
+    def watched(self) -> str:
+        """What is validated on, in words."""
+        count = len(self.validation_names)
+        words = f"the last {count} training shapes"
+        if self.holdout:
+            words = f"{count} held-out training shapes"
+        elif self.split.validation:
+            words = f"{counted(count, 'held-out shape')} of the split"
+        return words if self.validates_unseen else f"{words}, which are also fitted"
+
+    @property
     def protocol(self) -> str:
         """One sentence for logs and results: what is fitted and what is validated on."""
-        seen = f"the last {len(self.validation_names)} training shapes, which are also fitted"
-        held = f"{self.holdout} held-out training shapes"
         sets = [(self.fit_names, self.train_set), *((more.names, more.shapes) for more in self.also)]
         fitted = " and ".join(f"{len(names)} shapes of {shapes.name}" for names, shapes in sets)
-        return f"split {self.split.label}; fitted on {fitted}, validated on {held if self.holdout else seen}"
+        return f"split {self.split.label}; fitted on {fitted}, validated on {self.watched}"
 
     def train_names(self) -> tuple[str, ...]:
-        """Return the names of the split's training shapes; DataError if the set lacks one."""
-        self.split.require(self.train_set.names, self.train_set.name, "train")
-        return self.split.train
+        """Return the names of the shapes that are fitted or validated on; DataError if the set lacks one."""
+        for part in ("train", "validation"):
+            self.split.require(self.train_set.names, self.train_set.name, part)
+        return tuple(dict.fromkeys([*self.split.train, *self.validation_names]))
 
     def test_names(self, shapes: ShapeSet) -> tuple[str, ...]:
         """Return the names of the split's test shapes; DataError if the set lacks one."""

@@ -24,12 +24,16 @@ class Split:
         Names of the shapes, in order.
     source
         Where the split was published.
+    validation
+        Names of further shapes, neither fitted nor tested on, that a training is watched on.  The checksum leaves them
+        out, since no result depends on them.
     """
 
     name: str
     train: tuple[str, ...]
     test: tuple[str, ...]
     source: str = ""
+    validation: tuple[str, ...] = ()
 
     @property
     def checksum(self) -> str:
@@ -55,7 +59,7 @@ class Split:
         return self.train[:keep], self.train[keep:]
 
     def require(self, available: Sequence[str], where: str, part: str) -> None:
-        """Raise a DataError if shapes of `part` ("train" or "test") are not among `available`."""
+        """Raise a DataError if shapes of `part` ("train", "validation" or "test") are not among `available`."""
         wanted: tuple[str, ...] = getattr(self, part)
         missing = [name for name in wanted if name not in set(available)]
         if missing:
@@ -66,25 +70,25 @@ class Split:
 
 
 def read_split(path: str | Path) -> Split:
-    """Read a split from json: an object with name, train, test and, if it is to be verified, checksum.
+    """Read a split from json: an object with name, train, test and, if there are any, source, validation and checksum.
 
     Raises
     ------
     DataError
-        If the file is no split, a shape is in both lists or twice in one, or the checksum differs.
+        If the file is no split, a shape is in two lists or twice in one, or the checksum differs.
     """
     try:
         content = json.loads(Path(path).read_text())
-        lists = content["train"], content["test"]
+        lists = content["train"], content["test"], content.get("validation", [])
         if not all(isinstance(names, list) and all(isinstance(name, str) for name in names) for names in lists):
-            raise TypeError("train and test are not lists of names")
-        train, test = map(tuple, lists)
-        split = Split(str(content["name"]), train, test, str(content.get("source", "")))
+            raise TypeError("train, test and validation are not lists of names")
+        train, test, validation = map(tuple, lists)
+        split = Split(str(content["name"]), train, test, str(content.get("source", "")), validation)
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise DataError(f"{path}: not a split file; wanted json with name, train and test ({error!r})") from error
-    both = [*split.train, *split.test]
-    if len(set(both)) != len(both):
-        twice = sorted({name for name in both if both.count(name) > 1})
+    every = [*split.train, *split.validation, *split.test]
+    if len(set(every)) != len(every):
+        twice = sorted({name for name in every if every.count(name) > 1})
         raise DataError(f"{path}: listed more than once: {', '.join(twice[:5])}")
     stated = content.get("checksum", split.checksum)
     if stated != split.checksum:

@@ -17,6 +17,9 @@ THRESHOLDS: FloatArray = np.linspace(0.0, 0.25, 251)
 FLIP_MARGIN = 0.05
 """How much nearer (fraction of the normaliser) a match must be to the mirrored truth to count as a left-right flip."""
 
+FAR = 0.1
+"""Error (fraction of the normaliser) above which a match is a far miss: it is on another part of the body."""
+
 
 def average_geodesic_error(errors: FloatArray) -> float:
     """Return the mean error (AGE) of P points, in the fraction that the errors are in.
@@ -40,6 +43,17 @@ def exact_rate(matched: IntArray, truth: IntArray) -> float:
     if matched.shape != truth.shape or matched.size == 0:
         raise DataError(f"{matched.shape} matches against {truth.shape} true vertices; wanted the same number, not 0")
     return float((matched == truth).mean())
+
+
+def far_rate(errors: FloatArray) -> float:
+    """Return the fraction of P points that are missed by more than `FAR`.
+
+    Examples
+    --------
+    >>> far_rate(np.array([0.0, 0.1, 0.11, 0.5]))
+    0.5
+    """
+    return float((_points(errors) > FAR).mean())
 
 
 def percentile95(errors: FloatArray) -> float:

@@ -6,25 +6,31 @@ import math
 import sys
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import lightning as L
 import torch
 from torch import Tensor
 
+from csm.data.base import DataModule
 from csm.data.shapes import InMemory
-from csm.errors import NumericalError
+from csm.errors import ConfigError, NumericalError
 from csm.evaluation.engine import evaluate
+from csm.evaluation.metrics import far_rate
 from csm.evaluation.protocol import EvaluationProtocol
 from csm.evaluation.results import Evaluation
 from csm.experiments.ranks import gathered
-from csm.learning.loading import LightningData
+from csm.learning.loading import FITTED, UNSEEN, LightningData, metric_group
 from csm.matching.methods import PrecomputedMethod
 
 
 class ValidationErrors(L.Callback):
-    """Log `val/age` and `val/exact`: matching errors between validation shapes, at sampled template points.
+    """Log how well validation shapes are matched to each other, at sampled template points.
+
+    These are `val/age`, the mean error; `val/exact`, the fraction of points matched exactly; `val/far`, that of far
+    misses (`csm.evaluation.metrics.far_rate`); and, where the set knows the mirrored template, `val/flip`, that of
+    left-right flips.  They are called `fit/age` and so on where the validation shapes are also fitted.
 
     Parameters
     ----------
@@ -61,10 +67,9 @@ class ValidationErrors(L.Callback):
         parts = gathered(trainer, mine)
         if parts is not None:
             self.latest = self._measured(loaded, {name: x for each in parts for name, x in each.items()})
-        summary = trainer.strategy.broadcast(None if self.latest is None else dict(self.latest.summary))
-        if summary is not None:
-            for name in ("age", "exact"):
-                pl_module.log(f"val/{name}", summary[name], prog_bar=True, sync_dist=True)
+        found = trainer.strategy.broadcast(None if self.latest is None else _shown(self.latest))
+        for name, value in (found or {}).items():
+            pl_module.log(f"{metric_group(trainer)}/{name}", value, prog_bar=True, sync_dist=True)
 
     def _measured(self, loaded: LightningData, found: dict[str, Tensor]) -> Evaluation | None:
         if len(found) < 2:
@@ -72,6 +77,23 @@ class ValidationErrors(L.Callback):
         shapes = InMemory([shape for shape in loaded.data.validation_shapes() if shape.name in found], "validation")
         method = PrecomputedMethod(found, "validation")
         return evaluate(method, shapes, self.protocol, store=loaded.data.store, workers=1, progress=False)[0]
+
+
+def _shown(measured: Evaluation) -> dict[str, float]:
+    """Return the numbers that are logged of a validation, without those that are not known."""
+    summary = measured.summary
+    found = {"age": summary["age"], "exact": summary["exact"], "far": far_rate(measured.errors)}
+    return found if math.isnan(summary["flip_rate"]) else found | {"flip": summary["flip_rate"]}
+
+
+def require_monitored(callbacks: Iterable[L.Callback], data: DataModule) -> None:
+    """Raise a ConfigError if a callback, such as one that stops early, waits for errors that are not measured."""
+    for name in (str(getattr(callback, "monitor", None)) for callback in callbacks):
+        if name.startswith(f"{UNSEEN}/") and not data.validates_unseen:
+            raise ConfigError(
+                f"callbacks: one of them has monitor={name}, which is of shapes that are not fitted, but this training "
+                f"is validated on {data.watched}; hold some out (data.holdout=10), or monitor {FITTED}{name[3:]}"
+            )
 
 
 class FiniteLoss(L.Callback):
@@ -139,7 +161,7 @@ class EpochLines(L.Callback):
     """Print one line per epoch into logs: what a progress bar would show, and the time the epoch took.
 
     Where the output is a terminal, Lightning's own bar is there instead and nothing is printed.  A validation's numbers
-    are in the line of its epoch only.
+    are in the line of its epoch only, and the line says if they are of shapes that are also fitted.
     """
 
     def __init__(self) -> None:
@@ -157,11 +179,14 @@ class EpochLines(L.Callback):
         """Print the line."""
         if sys.stdout.isatty() or not trainer.is_global_zero:
             return
+        group = f"{metric_group(trainer)}/"
         shown = {
             name: float(value)
             for name, value in trainer.progress_bar_metrics.items()
-            if self._validated or not name.startswith("val/")
+            if self._validated or not name.startswith(group)
         }
         numbers = "".join(f", {name} {value:.4g}" for name, value in shown.items())
+        if group == f"{FITTED}/" and any(name.startswith(group) for name in shown):
+            numbers += f" ({group} is of shapes that are also fitted)"
         seconds = time.perf_counter() - self._begun
         print(f"epoch {trainer.current_epoch + 1} of {trainer.max_epochs}: {seconds:.1f} s{numbers}", flush=True)

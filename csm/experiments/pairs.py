@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from csm._counts import counted
 from csm._types import FloatArray
 from csm.evaluation.engine import evaluate
 from csm.evaluation.results import PairRow
@@ -50,10 +52,23 @@ def pairs_table(tested: Tested) -> Table:
     return Table(columns, lines, f"{tested.label}. {shown}, the worst first; {unit}.")
 
 
+def worst_line(tested: Tested) -> str:
+    """Name the worst pair of a test set in a line."""
+    rows = worst_first(tested)
+    worst, unit = rows[0], f"thousandths of the {tested.evaluation.protocol.normaliser}"
+    flips = f", {100 * worst.flip:.0f} % of its points left-right flipped" if worst.flip else ""
+    pair = f"{worst.source} to {worst.target} with {1000 * worst.age:.1f} {unit}{flips}"
+    return f"worst of {counted(len(rows), 'pair')} of {tested.label}: {pair}"
+
+
 def common_view(tested: Tested) -> View:
-    """Look at a set with the axis up that is longest in most of its shapes; arms spread wide mislead only one."""
-    axes = Counter(guess_up(tested.shapes.load(name).mesh) for name in tested.names)
-    ((most_common, _),) = axes.most_common(1)
+    """Look at the shapes of a test set as `view_of_most` does."""
+    return view_of_most(tested.shapes.load(name).mesh for name in tested.names)
+
+
+def view_of_most(meshes: Iterable[Mesh]) -> View:
+    """Look at meshes with the axis up that is longest in most of them; arms spread wide mislead only one."""
+    ((most_common, _),) = Counter(map(guess_up, meshes)).most_common(1)
     return View(up=most_common)
 
 

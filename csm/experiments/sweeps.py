@@ -22,7 +22,7 @@ MEAN_ERROR = "mean test error"
 """The quantity that jobs are compared by unless another is asked for: the mean of `age/...` over the test sets."""
 
 _RESULT = "result.json"
-_SHOWN = ("status", "seconds", "train/loss", "val/age")
+_SHOWN = ("status", "seconds", "train/loss", "val/age", "fit/age")
 _SEED = "seed"
 _MARK = "Made by csm sweep-report."
 
@@ -166,7 +166,8 @@ def write_sweep_report(folder: Path, out: Path, by: str | None = None) -> SweepJ
     out
         The page, ``.html``.
     by
-        The number that jobs are compared by; the smallest is the best.  By default `MEAN_ERROR`, else `val/age`.
+        The number that jobs are compared by; the smallest is the best.  By default `MEAN_ERROR`, else `val/age`,
+        else `fit/age`.
 
     Raises
     ------
@@ -177,7 +178,7 @@ def write_sweep_report(folder: Path, out: Path, by: str | None = None) -> SweepJ
     """
     jobs = read_sweep(folder)
     quantity = by or next(
-        (q for q in (MEAN_ERROR, "val/age", "train/loss") if any(j.value(q) is not None for j in jobs)), ""
+        (q for q in (MEAN_ERROR, "val/age", "fit/age", "train/loss") if any(j.value(q) is not None for j in jobs)), ""
     )
     ranked = sorted(
         (job for job in jobs if job.value(quantity) is not None), key=lambda job: float(job.value(quantity) or 0)

@@ -27,7 +27,8 @@ from csm.data.base import DataModule
 from csm.descriptors.base import record
 from csm.errors import ConfigError
 from csm.evaluation.provenance import provenance
-from csm.experiments.callbacks import EpochLines, FiniteLoss, ValidationErrors
+from csm.experiments.callbacks import EpochLines, FiniteLoss, ValidationErrors, require_monitored
+from csm.experiments.history import Curves, History, curves_of
 from csm.experiments.ranks import (
     SharedStatistics,
     prepare_once,
@@ -90,13 +91,19 @@ class Training:
 
 @dataclass(frozen=True, eq=False)
 class Trained:
-    """A trained network, its checkpoint, and what was measured on the way; `rank` is that of the process."""
+    """A trained network, its checkpoint, and what was measured at the end and on the way; `rank` is of the process."""
 
     module: CSMModule
     checkpoint: Path
     seconds: float
     measured: Mapping[str, float]
     rank: int = 0
+    curves: Curves = field(default_factory=dict)
+
+    @property
+    def parameters(self) -> int:
+        """Number of weights of the network, with the classifier over the points of the template."""
+        return sum(weights.numel() for weights in self.module.network.parameters())
 
 
 def default_callbacks(seed: int = 0) -> list[L.Callback]:
@@ -160,7 +167,7 @@ def _fit(training: Training, trainer: L.Trainer, folder: Path, resume: Path | st
     if trainer.is_global_zero:
         export_module(module, folder / "export")
     measured = {key: float(value) for key, value in trainer.callback_metrics.items()}
-    return Trained(module, checkpoint, seconds, measured, trainer.global_rank)
+    return Trained(module, checkpoint, seconds, measured, trainer.global_rank, curves_of(trainer))
 
 
 def shapes_per_step(trainer: L.Trainer) -> int:
@@ -239,6 +246,7 @@ def make_trainer(training: Training, folder: Path) -> L.Trainer:
     Lightning's bar needs a terminal, elsewhere `EpochLines` takes its place.
     """
     _quiet_lightning()
+    require_monitored(training.callbacks, training.data)
     last = last_checkpoint(folder)
     keep = ModelCheckpoint(last.parent, filename=last.stem, enable_version_counter=False, save_on_train_epoch_end=True)
     for callback in training.callbacks:
@@ -254,7 +262,7 @@ def make_trainer(training: Training, folder: Path) -> L.Trainer:
 
 def _trainer(training: Training, folder: Path, keep: ModelCheckpoint) -> L.Trainer:
     return training.trainer(
-        callbacks=[SharedStatistics(), *training.callbacks, RandomStates(), FiniteLoss(), keep],
+        callbacks=[SharedStatistics(), *training.callbacks, RandomStates(), FiniteLoss(), History(), keep],
         use_distributed_sampler=False,  # the data share themselves out
         plugins=[WholeCheckpoints()],
         logger=_make_logger(training, folder),

@@ -89,6 +89,16 @@ class SharedOrder(Sampler[int]):
         return len(self.share.of(range(self.n)))
 
 
+UNSEEN, FITTED = "val", "fit"
+"""What the metrics of validation shapes are called by: shapes that are held out of the fit, and those that are not."""
+
+
+def metric_group(trainer: L.Trainer | None) -> str:
+    """Return `FITTED` if the validation shapes of a training are also fitted; else, or without one, `UNSEEN`."""
+    loaded = getattr(trainer, "datamodule", None)
+    return FITTED if isinstance(loaded, LightningData) and not loaded.data.validates_unseen else UNSEEN
+
+
 class LightningData(L.LightningDataModule):
     """Loaders of the training and validation shapes of a data module.
 

@@ -14,6 +14,7 @@ from torch.optim.lr_scheduler import CosineAnnealingLR, LRScheduler, OneCycleLR,
 from csm.descriptors import Coordinates
 from csm.errors import ConfigError
 from csm.learning.describer import FORMAT, Describer
+from csm.learning.loading import metric_group
 from csm.learning.loss import Products, linear_cross_entropy
 from csm.learning.samples import NetworkInput, ShapeSample, mirrored_template
 
@@ -137,7 +138,8 @@ class CSMModule(Describer, L.LightningModule):
     def validation_step(self, sample: ShapeSample) -> Tensor:
         """Return the learned descriptor of one shape; the loss is logged, the errors are a callback's business."""
         last = self(sample.features, sample.surface)
-        self.log("val/loss", self.loss(last, sample), prog_bar=True, batch_size=sample.counts, sync_dist=True)
+        name = f"{metric_group(self._trainer)}/loss"
+        self.log(name, self.loss(last, sample), prog_bar=True, batch_size=sample.counts, sync_dist=True)
         return self.descriptor(last, NetworkInput(sample.features, sample.surface))
 
     def configure_optimizers(self) -> Any:

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import LogFormatter
 
 from csm._types import FloatArray
 from csm.errors import ConfigError
@@ -175,6 +176,44 @@ def losses_figure(curves: Mapping[str, Sequence[float]]) -> Figure:
     axes.set_ylabel("loss", fontsize=9)
     axes.legend(frameon=False, fontsize=8)
     plain_axes(axes)
+    return figure
+
+
+def training_figure(curves: Mapping[str, Sequence[tuple[int, float]]]) -> Figure:
+    """Plot how a training went: losses on the left, and on the right the errors on validation shapes, if there are any.
+
+    Parameters
+    ----------
+    curves
+        Name, such as "train/loss" or "val/age" -> epochs, counted from 1, and the values after them.  Mean errors and
+        rates are fractions.
+
+    Raises
+    ------
+    ConfigError
+        If there is no curve.
+    """
+    losses = {name: curve for name, curve in curves.items() if name.endswith("/loss")}
+    panels = [part for part in (losses, {n: c for n, c in curves.items() if n not in losses}) if part]
+    if not panels:
+        raise ConfigError("training figure: wanted at least one curve")
+    figure = Figure(figsize=(4.6 * len(panels), 3.3), layout="constrained")
+    FigureCanvasAgg(figure)
+    for axes, part in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
+        for k, (name, curve) in enumerate(part.items()):
+            epochs, values = zip(*curve, strict=True)
+            axes.plot(epochs, values, marker="o", markersize=3, label=name, **line_style(k))
+        axes.set_xlabel("epoch", fontsize=9)
+        axes.set_ylabel("loss" if part is losses else "fraction (age: of the diameter)", fontsize=9)
+        if part is losses:
+            axes.set_yscale("log")
+            axes.yaxis.set_major_formatter(LogFormatter(labelOnlyBase=False))  # 8, not 8 times a power of ten
+            axes.yaxis.set_minor_formatter(LogFormatter(labelOnlyBase=False, minor_thresholds=(1, 0.4)))
+        else:
+            axes.set_ylim(bottom=0)
+        axes.legend(frameon=False, fontsize=8)
+        axes.xaxis.get_major_locator().set_params(integer=True)
+        plain_axes(axes)
     return figure
 
 

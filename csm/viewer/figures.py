@@ -9,14 +9,16 @@ from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
+from csm._counts import counted
 from csm._types import FloatArray, IntArray
 from csm.errors import ConfigError
 from csm.evaluation.results import Evaluation
@@ -86,16 +88,21 @@ def cqc_figure(curves: Curves, *, normaliser: str = "diameter", limit: float | N
     return figure
 
 
-def filters_figure(evals: ArrayLike, responses: Mapping[str, NDArray[np.floating]]) -> Figure:
-    """Plot learned spectral filters over the eigenvalues, one panel per layer.
+def filters_figure(evals: ArrayLike, responses: Mapping[str, NDArray[np.floating]], strongest: int = 12) -> Figure:
+    """Plot learned spectral filters over the eigenvalues, one column per layer.
+
+    Above is how strong the gains of a layer are (without their signs): the median over its filters, and the bands that
+    hold the middle half and nine tenths of them.  Below are the filters with the greatest root mean square.
 
     Parameters
     ----------
     evals
-        Shape (K,), of the Laplacian; 1 / area.
+        Shape (K,), of the Laplacian, ascending; drawn as fractions of the last one.
     responses
         Name of the layer -> its filters, shape (K, ...): all that follows K are separate filters, such as input and
-        output channels.  All are drawn, so choose a subset of a wide layer.  The heavy line is their root mean square.
+        output channels.
+    strongest
+        How many filters of a layer are drawn one by one, at most.
 
     Raises
     ------
@@ -106,22 +113,44 @@ def filters_figure(evals: ArrayLike, responses: Mapping[str, NDArray[np.floating
     wrong = [name for name, r in responses.items() if r.ndim < 2 or r.shape[0] != len(x)]
     if not responses or wrong:
         raise ConfigError(f"filters figure: layers {wrong or 'none'}; wanted layers of shape ({len(x)}, ...)")
-    figure = Figure(figsize=(3.4 * len(responses), 3.1), layout="constrained")
+    figure = Figure(figsize=(3.8 * len(responses), 6.4), layout="constrained")
     FigureCanvasAgg(figure)
-    panels = figure.subplots(1, len(responses), sharex=True, squeeze=False)[0]
-    for axes, (name, given) in zip(panels, responses.items(), strict=True):
+    panels = figure.subplots(2, len(responses), sharex=True, squeeze=False)
+    for (above, below), (name, given) in zip(panels.T, responses.items(), strict=True):
         filters = np.asarray(given, dtype=np.float64).reshape(len(x), -1)
-        lines = [np.column_stack([x, column]) for column in filters.T]
-        strength = max(0.1, min(0.6, 15 / len(lines)))
-        axes.add_collection(LineCollection(lines, colors=CYCLE[0], linewidths=0.8, alpha=strength))
-        axes.plot(x, np.sqrt((filters**2).mean(axis=1)), color=CYCLE[1], linewidth=2, label="root mean square")
-        axes.autoscale_view()
-        axes.set_title(f"{name}: {len(lines)} filters", fontsize=10)
-        axes.set_xlabel("eigenvalue λ (1 / area)")
-        plain_axes(axes)
-    panels[0].set_ylabel("response")
-    panels[0].legend(frameon=False, fontsize=8)
+        _gain_bands(above, x / x[-1], np.abs(filters))
+        _strongest(below, x / x[-1], filters, given.shape[1:], strongest)
+        above.set_title(f"{name}: {counted(filters.shape[1], 'filter')}", fontsize=10)
+        below.set_xlabel(f"eigenvalue λ / λmax, λmax = {x[-1]:.3g}", fontsize=9)
+        for axes in (above, below):
+            plain_axes(axes)
+            axes.tick_params(labelsize=8)
+    panels[0, 0].set_ylabel("size of the gain", fontsize=9)
+    panels[1, 0].set_ylabel("gain of the strongest", fontsize=9)
     return figure
+
+
+def _gain_bands(axes: Axes, x: FloatArray, sizes: FloatArray) -> None:
+    """Draw the median and two quantile bands of gains, shape (K, C), over x, shape (K,)."""
+    low, lower, middle, upper, high = np.quantile(sizes, [0.05, 0.25, 0.5, 0.75, 0.95], axis=1)
+    axes.fill_between(x, low, high, color=CYCLE[0], alpha=0.18, linewidth=0, label="nine tenths")
+    axes.fill_between(x, lower, upper, color=CYCLE[0], alpha=0.35, linewidth=0, label="middle half")
+    axes.plot(x, middle, color=CYCLE[0], linewidth=1.8, label="median")
+    axes.set_ylim(0, 1.15 * max(float(high.max()), 1e-9))  # leaves room for the legend
+    axes.legend(frameon=False, fontsize=7, ncols=3, loc="upper center")
+
+
+def _strongest(axes: Axes, x: FloatArray, filters: FloatArray, shape: tuple[int, ...], count: int) -> None:
+    """Draw the columns with the greatest root mean square of filters, shape (K, C); the legend has their channels."""
+    order = np.argsort(-np.mean(filters**2, axis=0), kind="stable")[:count]
+    colors = colormaps["turbo"](np.linspace(0.05, 0.95, len(order)))
+    for k, column in enumerate(order):
+        label = " → ".join(str(i) for i in np.unravel_index(column, shape))
+        axes.plot(x, filters[:, column], color=colors[k], linestyle="-" if k % 2 else "--", linewidth=1.2, label=label)
+    axes.axhline(0, color="0.3", linewidth=0.8)
+    title = "channel" if len(shape) == 1 else "channel in → out"
+    axes.legend(frameon=False, fontsize=7, title_fontsize=7, ncols=4, title=title, loc="upper center",
+                bbox_to_anchor=(0.5, -0.2))  # fmt: skip
 
 
 def correspondence_figure(

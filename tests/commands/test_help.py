@@ -4,8 +4,11 @@ import subprocess
 import sys
 
 import pytest
+from omegaconf import OmegaConf
 
-from csm.commands.help import help_text, read_page
+from csm.commands.choices import config_folder
+from csm.commands.groups import data_configs
+from csm.commands.help import SETTINGS, help_text, read_page
 from csm.commands.main import COMMANDS
 
 
@@ -25,6 +28,16 @@ def test_groups_are_listed_with_their_options_and_single_ones_as_settings():
     assert "optimizer.lr=" in text
     assert "optimizer  " not in text.split("groups, of which")[1]
     assert "groups" not in help_text("check")
+
+
+def test_settings_of_data_and_trainer_that_are_named_exist_and_do_what_is_said():
+    text = help_text("train")
+    known = {f"data.{key}" for node in data_configs().values() for key in node}
+    known |= {f"trainer.{key}" for key in OmegaConf.load(config_folder() / "trainer" / "default.yaml")}
+    named = {example.partition("=")[0] for example in SETTINGS["train"]}
+    assert named <= known
+    assert {"data.also", "data.split", "data.holdout", "data.root", "trainer.max_epochs"} <= named
+    assert all(f"  {example}" in text for example in SETTINGS["train"])
 
 
 def test_words_without_a_key_are_in_the_usage():

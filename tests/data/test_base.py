@@ -102,12 +102,35 @@ def test_held_out_shapes_are_not_fitted_and_the_protocol_says_so(toys, tmp_path)
     assert "also fitted" in module(toys, tmp_path).protocol
 
 
+def test_validation_shapes_of_the_split_are_prepared_and_not_fitted(toys, tmp_path):
+    split = Split("mine", ("toy0", "toy1"), ("toy4", "toy5"), validation=("toy2", "toy3"))
+    data = module(toys, tmp_path, split)
+    assert (data.fit_names, data.validation_names) == (split.train, split.validation)
+    assert data.validates_unseen
+    assert data.protocol.endswith("fitted on 2 shapes of toys, validated on 2 held-out shapes of the split")
+    data.prepare()
+    assert toys.read == dict.fromkeys(("toy0", "toy1", "toy2", "toy3"), 1)
+    assert not module(toys, tmp_path).validates_unseen
+    held = module(toys, tmp_path, split, holdout=1)
+    assert (held.fit_names, held.validation_names, held.validates_unseen) == (("toy0",), ("toy1",), True)
+
+
+def test_shapes_that_are_fitted_in_another_form_are_not_unseen(toys, tmp_path):
+    split = Split("mine", ("toy0", "toy1"), ("toy4", "toy5"), validation=("s00_p00",))
+    assert module(toys, tmp_path, split).validates_unseen
+    data = module(toys, tmp_path, split, also=["humans"])
+    assert not data.validates_unseen
+    assert data.watched.endswith("also fitted")
+
+
 def test_a_shape_that_the_split_names_and_the_set_lacks_is_reported(toys, tmp_path):
     data = module(toys, tmp_path, Split("mine", ("toy0", "toy99"), ("toy1", "toy98")))
     with pytest.raises(DataError, match=r"1 of the 2 train shapes of split mine are missing \(toy99\)"):
         data.prepare()
     with pytest.raises(DataError, match=r"1 of the 2 test shapes of split mine are missing \(toy98\)"):
         data.test_names(toys)
+    with pytest.raises(DataError, match=r"1 of the 1 validation shapes of split mine are missing \(toy97\)"):
+        module(toys, tmp_path, Split("mine", ("toy0",), ("toy1",), validation=("toy97",))).prepare()
 
 
 def test_all_shapes_that_cannot_be_used_are_reported_together(tmp_path):

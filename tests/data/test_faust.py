@@ -116,6 +116,13 @@ def test_a_folder_without_the_set_names_what_was_wanted(tmp_path):
         FaustDataModule(layouts.mpi_faust(tmp_path), test=(6890,), split="faust_90_10", **CHEAP)
 
 
+def test_the_published_split_fits_all_its_training_shapes_and_says_so(tmp_path):
+    data = FaustDataModule(layouts.mpi_faust(tmp_path), test=(6890,), **CHEAP)
+    assert (data.fit_names, data.validates_unseen) == (SPLIT.train, False)
+    assert "validated on the last 10 training shapes, which are also fitted" in data.protocol
+    assert FaustDataModule(layouts.mpi_faust(tmp_path), test=(6890,), holdout=10, **CHEAP).validates_unseen
+
+
 @pytest.mark.data
 def test_real_faust_trains_on_one_resolution_and_tests_on_others(data_set, tmp_path):
     for root in {data_set(name) for name in ("FAUST_6890", "FAUST_10000")}:

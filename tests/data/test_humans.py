@@ -144,4 +144,8 @@ def test_splits_are_by_person_and_name_existing_shapes() -> None:
     default = HumansDataModule(descriptor=HKS())
     assert default.split is SPLITS[0]
     assert list(default.test_sets) == ["humans", "humans_refined_10000", "humans_refined_15000", "humans_remeshed_5000"]
-    assert HumansDataModule(split="humans_demo", descriptor=HKS()).split is SPLITS[1]
+    demo = HumansDataModule(split="humans_demo", descriptor=HKS())
+    assert demo.split is SPLITS[1]
+    assert demo.validates_unseen
+    people = [{name[:3] for name in names} for names in (demo.fit_names, demo.validation_names, demo.split.test)]
+    assert people == [{"s00", "s02", "s04", "s06"}, {"s05", "s07"}, {"s08", "s09"}]

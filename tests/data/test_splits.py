@@ -24,7 +24,8 @@ def test_the_splits_of_csm_are_those_that_results_were_published_with():
     splits = [split for name in DATA_SETS for split in data_set(name).splits]
     assert {split.name: split.checksum for split in splits} == CHECKSUMS
     assert all(split.source for split in splits)
-    assert all(len({*s.train, *s.test}) == len(s.train) + len(s.test) for s in splits)
+    every = [[*s.train, *s.test, *s.validation] for s in splits]
+    assert all(len(set(names)) == len(names) for names in every)
 
 
 def test_the_checksum_depends_on_order_and_names():
@@ -41,6 +42,15 @@ def test_a_split_is_read_from_json(tmp_path):
     content = {"name": "tiny", "train": ["x", "y"], "test": ["z"], "source": "made up", "checksum": TINY.checksum}
     (tmp_path / "s.json").write_text(json.dumps(content))
     assert read_split(tmp_path / "s.json") == TINY
+
+
+def test_a_split_may_have_validation_shapes_that_leave_its_checksum_as_it_is(tmp_path):
+    content = {"name": "tiny", "train": ["x", "y"], "test": ["z"], "validation": ["v"], "checksum": TINY.checksum}
+    (tmp_path / "s.json").write_text(json.dumps(content))
+    assert read_split(tmp_path / "s.json").validation == ("v",)
+    (tmp_path / "s.json").write_text(json.dumps(content | {"validation": ["z"]}))
+    with pytest.raises(DataError, match="more than once: z"):
+        read_split(tmp_path / "s.json")
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,9 @@ from csm.experiments.pairs import (
     pairs_table,
     spread,
     vertex_errors,
+    view_of_most,
     worst_first,
+    worst_line,
     worst_viewers,
     write_pairs,
 )
@@ -23,6 +25,7 @@ from csm.experiments.testing import measure_set
 from csm.learning.loading import LightningData
 from csm.matching.nearest import nearest
 from csm.matching.network import NetworkMethod
+from csm.mesh.shape import Mesh
 from csm.operators.geodesic import geodesics
 from tests.learning.toys import make
 from tests.shapes import sphere
@@ -51,6 +54,15 @@ def test_the_table_begins_with_the_worst_pair(tested: Tested) -> None:
     errors = [float(str(line[2])) for line in table.rows]
     assert errors == sorted(errors, reverse=True)
     assert errors[0] == pytest.approx(1000 * rows[0].age, abs=0.06)
+
+
+def test_the_worst_pair_is_said_in_a_line(tested: Tested) -> None:
+    worst = worst_first(tested)[0]
+    said = worst_line(tested)
+    assert said.startswith(
+        f"worst of {len(tested.evaluation.rows)} pairs of toys: {worst.source} to {worst.target} with "
+    )
+    assert said.endswith(f"{1000 * worst.age:.1f} thousandths of the sqrt_area")
 
 
 def test_errors_of_a_pair_are_heat_distances_at_every_vertex(tested: Tested) -> None:
@@ -106,3 +118,10 @@ def test_values_are_spread_to_what_is_near_and_not_further() -> None:
     assert np.isnan(filled[up < -0.5]).all()
     nothing = np.full(mesh.n_vertices, np.nan)
     np.testing.assert_array_equal(spread(mesh, nothing), nothing)
+
+
+def test_one_shape_with_its_arms_spread_wide_lies_down_alone() -> None:
+    ball = sphere(1)
+    tall, wide = (Mesh(ball.vertices * scale, ball.faces) for scale in ((1, 1, 3), (4, 1, 3)))
+    assert view_of_most([wide, tall, tall]) == view_of_most([tall])
+    assert view_of_most([wide]) != view_of_most([tall])

@@ -41,7 +41,7 @@ def close(epochs, wanted) -> None:
 def test_the_curve_is_that_of_one_process_with_two_shapes_per_step(together, tmp_path):
     """Losses, validation (with statistics of batch normalisation) and rates; both ranks know the same numbers."""
     _, losses = two_ranks.curve(tmp_path, "one", 1)
-    assert {"train/loss", "val/loss", "val/age", "val/exact"} <= set(losses.epochs[-1])
+    assert {"train/loss", "fit/loss", "fit/age", "fit/exact"} <= set(losses.epochs[-1])
     for rank in together.ranks:
         close(rank["epochs"], losses.epochs)
         assert rank["rates"] == losses.rates

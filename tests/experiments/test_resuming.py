@@ -68,8 +68,8 @@ def test_a_training_that_was_stopped_ends_as_one_that_was_not(tmp_path, stopping
     again = fit(training(tmp_path), tmp_path / "cut")
     kept, wanted = weights(again.checkpoint), weights(whole.checkpoint)
     assert all(torch.equal(kept[name], wanted[name]) for name in wanted)
-    assert {k: again.measured[k] for k in ("val/age", "train/loss")} == {
-        k: whole.measured[k] for k in ("val/age", "train/loss")
+    assert {k: again.measured[k] for k in ("fit/age", "train/loss")} == {
+        k: whole.measured[k] for k in ("fit/age", "train/loss")
     }
 
 

@@ -43,7 +43,7 @@ def test_a_training_leaves_a_checkpoint_an_export_and_its_numbers(tmp_path):
         "checkpoints",
     }
     assert last_checkpoint(tmp_path / "run").is_file()
-    assert {"train/loss", "val/loss", "val/age", "val/exact"} <= set(trained.measured)
+    assert {"train/loss", "fit/loss", "fit/age", "fit/exact"} <= set(trained.measured)
     assert trained.seconds > 0
     store = training.data.store
     wanted = NetworkMethod(trained.module).describe(blob(2), store).features

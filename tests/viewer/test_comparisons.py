@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from csm.errors import ConfigError
-from csm.viewer.comparisons import Sweep, curve_panels, dots_figure, sweeps_figure
+from csm.viewer.comparisons import Sweep, curve_panels, dots_figure, sweeps_figure, training_figure
 from csm.viewer.figures import Curve
 
 
@@ -83,3 +83,15 @@ def test_a_sweep_has_a_line_per_condition_each_with_its_preset_marked():
     rings = [line for line in axes.get_lines() if line.get_markersize() == 9]
     assert [list(ring.get_ydata()) for ring in rings] == [[2.0], [5.0]]
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["preset", "fine", "coarse"]
+
+
+def test_a_training_has_its_losses_beside_its_errors():
+    curves = {"train/loss": [(1, 5.0), (2, 3.0)], "val/loss": [(2, 4.0)], "val/age": [(2, 0.1)]}
+    losses, errors = training_figure(curves).axes
+    assert [line.get_label() for line in losses.get_lines()] == ["train/loss", "val/loss"]
+    np.testing.assert_array_equal(losses.get_lines()[0].get_xydata(), curves["train/loss"])
+    np.testing.assert_array_equal(errors.get_lines()[0].get_xydata(), curves["val/age"])
+    assert (losses.get_ylabel(), losses.get_yscale()) == ("loss", "log")
+    assert len(training_figure({"train/loss": [(1, 5.0)]}).axes) == 1
+    with pytest.raises(ConfigError, match="at least one curve"):
+        training_figure({})

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -64,17 +63,25 @@ def test_cqc_of_an_evaluation_takes_its_normaliser() -> None:
         cqc_figure({"identity": result, "bare": Curve(T, T, 0.1)})
 
 
-def test_filters_have_a_panel_per_layer_and_a_line_per_filter() -> None:
+def test_filters_are_shown_by_bands_of_their_gains_and_the_strongest_by_name() -> None:
     evals = np.linspace(0, 100, 16)
     wide = np.random.default_rng(0).normal(size=(16, 3, 5))
+    wide[:, 2, 4] *= 50
     figure = filters_figure(evals, {"conv1": wide, "conv2": wide[:, :1]})
-    assert [a.get_title() for a in figure.axes] == ["conv1: 15 filters", "conv2: 5 filters"]
-    for axes, count in zip(figure.axes, (15, 5), strict=True):
-        (lines,) = (c for c in axes.collections if isinstance(c, LineCollection))
-        assert len(lines.get_segments()) == count
-        assert "eigenvalue" in axes.get_xlabel()
-    rms = figure.axes[0].get_lines()[0].get_ydata()
-    np.testing.assert_allclose(rms, np.sqrt((wide**2).mean(axis=(1, 2))))
+    bands, few, strongest, all_five = figure.axes
+    assert [a.get_title() for a in (bands, few)] == ["conv1: 15 filters", "conv2: 5 filters"]
+    (median,) = bands.get_lines()
+    np.testing.assert_allclose(median.get_ydata(), np.median(np.abs(wide), axis=(1, 2)))
+    np.testing.assert_allclose(median.get_xdata(), evals / 100)
+    assert [len(a.collections) for a in (bands, few)] == [2, 2]
+    lines = [line for line in strongest.get_lines() if "→" in str(line.get_label())]
+    assert (len(lines), lines[0].get_label()) == (12, "2 → 4")
+    np.testing.assert_allclose(lines[0].get_ydata(), wide[:, 2, 4])
+    assert len({tuple(line.get_color()) for line in lines}) == 12
+    assert len(all_five.get_legend().get_texts()) == 5
+    assert "λmax = 100" in strongest.get_xlabel()
+    assert bands.get_ylabel()
+    assert strongest.get_ylabel()
 
 
 def test_correspondence_draws_source_target_and_errors() -> None:
