@@ -2,8 +2,8 @@
 
     python benchmarks/match.py --repeats 5
 
-The meshes are two of the built-in humans, 6,899 vertices each.  The ways to match take turns; the time is the median, the
-ratio that of the reference over it.  "again" is with all that the first run left in the store.
+The meshes are two of the built-in humans, 6,899 vertices each.  The ways to match take turns; the time is the median,
+the ratio that of the reference over it.  "again" is with all that the first run left in the store.
 """
 
 from __future__ import annotations
