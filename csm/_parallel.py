@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import partial
+from threading import Lock, local
 from typing import Any, ParamSpec, TypeVar
 
 from threadpoolctl import threadpool_info, threadpool_limits
@@ -102,12 +104,20 @@ def thread_map(function: Callable[[T], R], tasks: Sequence[T]) -> list[R]:
     and within another such map, there is one thread.
     """
     allowed = min(len(tasks), max((pool["num_threads"] for pool in threadpool_info()), default=1))
-    if allowed < 2:
+    if allowed < 2 or getattr(_here, "mapped", False):  # the limit of OpenMP is not seen by the threads of a map
         return [function(task) for task in tasks]
     # A solver may set one BLAS thread and then back what it found: the outer limit keeps two of them from leaving each
     # other's setting behind.
-    with threadpool_limits(1), ThreadPoolExecutor(allowed) as threads:
+    with _one_blas_thread(), ThreadPoolExecutor(allowed, initializer=_mark) as threads:
         return list(threads.map(function, tasks))
+
+
+_here = local()
+
+
+def _mark() -> None:
+    """Note that this thread is one of a map."""
+    _here.mapped = True
 
 
 def _run(
@@ -145,8 +155,30 @@ def _take(worker: Worker, label: Callable[[Any], str]) -> tuple[int, Any, Any]:
 
 
 def _on_one_thread(function: Callable[[T], R], task: T) -> R:
-    with threadpool_limits(1):
+    with _one_blas_thread():
         return function(task)
+
+
+_held = 0
+_limits: threadpool_limits | None = None
+_lock = Lock()
+
+
+@contextmanager
+def _one_blas_thread() -> Iterator[None]:
+    """Let BLAS use one thread; the last of those that overlap gives back what the first found."""
+    global _held, _limits
+    with _lock:
+        if not _held:
+            _limits = threadpool_limits(1)
+        _held += 1
+    try:
+        yield
+    finally:
+        with _lock:
+            _held -= 1
+            if not _held and _limits is not None:
+                _limits.restore_original_limits()
 
 
 def in_fresh_process(function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import os
 import threading
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -86,3 +87,27 @@ def test_threads_within_threads_are_one():
         return set(thread_map(lambda _: threading.get_ident(), range(4)))
 
     assert all(len(found) == 1 for found in thread_map(inside, range(4)))
+
+
+def test_maps_that_overlap_give_back_the_threads_that_the_first_found():
+    """The one that began first ends first, and the other must not keep what it found in between."""
+    before = [library["num_threads"] for library in threadpool_info()]
+    both, first = threading.Barrier(2), threading.Event()
+
+    def early(_: int) -> None:
+        both.wait(10)
+
+    def late(_: int) -> None:
+        both.wait(10)
+        first.wait(10)
+
+    def one(task: Callable[[int], None]) -> None:
+        parallel_map(task, [1], str, 1, what="wait", unit="number", progress=False)
+
+    threads = [threading.Thread(target=one, args=(task,)) for task in (early, late)]
+    for thread in threads:
+        thread.start()
+    threads[0].join(10)
+    first.set()
+    threads[1].join(10)
+    assert [library["num_threads"] for library in threadpool_info()] == before

@@ -110,7 +110,7 @@ class DataModule:
 
     def train_names(self) -> tuple[str, ...]:
         """Return the names of the shapes that are fitted or validated on; DataError if the set lacks one."""
-        for part in ("train", "validation"):
+        for part in ("train",) if self.holdout else ("train", "validation"):
             self.split.require(self.train_set.names, self.train_set.name, part)
         return tuple(dict.fromkeys([*self.split.train, *self.validation_names]))
 

@@ -110,6 +110,15 @@ def require_one_or_ranks(trainer: L.Trainer) -> None:
         )
 
 
+def require_single_precision(trainer: L.Trainer) -> None:
+    """Raise a ConfigError if the weights would not be in single precision, as descriptors and bases are."""
+    if trainer.precision in ("64-true", "bf16-true", "16-true"):
+        raise ConfigError(
+            f"trainer.precision={trainer.precision}: descriptors and bases are in single precision; wanted 32-true, or "
+            "bf16-mixed or 16-mixed for faster products"
+        )
+
+
 def is_started_from_outside(trainer: L.Trainer) -> bool:
     """Tell whether another program, such as srun or torchrun, starts all ranks, so that they can meet at any time."""
     environment = getattr(trainer.strategy, "cluster_environment", None)

@@ -34,6 +34,7 @@ from csm.experiments.ranks import (
     prepare_once,
     require_one_or_ranks,
     require_same_begin,
+    require_single_precision,
 )
 from csm.experiments.resuming import (
     AUTO,
@@ -257,6 +258,7 @@ def make_trainer(training: Training, folder: Path) -> L.Trainer:
     except (ValueError, TypeError, MisconfigurationException) as error:
         raise ConfigError(f"trainer: {' '.join(str(error).split())}") from error
     require_one_or_ranks(trainer)
+    require_single_precision(trainer)
     return trainer
 
 

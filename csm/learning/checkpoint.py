@@ -82,12 +82,18 @@ def load_module(path: str | os.PathLike[str]) -> Describer:
             "the network humans"
         )
     try:
-        return _load_export(path) if path.suffix == ".json" else _load_checkpoint(path)
+        found = _load_export(path) if path.suffix == ".json" else _load_checkpoint(path)
     except CsmError:
         raise
     except Exception as error:  # a foreign file can trip the readers in any way
         why = (str(error) or type(error).__name__).splitlines()[0]
         raise DataError(f"{path}: not a checkpoint of csm ({why})") from error
+    if found.places is not None:
+        try:
+            found.places.require_whole()
+        except ConfigError as error:
+            raise DataError(f"{path}: the weights are damaged, or were changed: {error}") from error
+    return found
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:

@@ -51,7 +51,7 @@ def mended(reading: Reading, other: Callable[[], Reading], mesh: Mesh) -> Tensor
     other
         Returns where they are on the other side; called only if a part seems to belong there.
     mesh
-        The shape, its faces oriented outwards.
+        The shape, its faces oriented outwards; where they are not, nothing can be told, and nothing is mended.
 
     Returns
     -------
@@ -62,6 +62,8 @@ def mended(reading: Reading, other: Callable[[], Reading], mesh: Mesh) -> Tensor
     --------
     >>> rows = mended(places.read(x, head), lambda: places.read(x, head, twins=True), mesh)  # doctest: +SKIP
     """
+    if mesh.signed_volume < 0:
+        return reading.rows
     shape = _Shape(mesh)
     turned = shape.large(shape.smooth(_turns(mesh, reading)) < 0)
     if not turned:

@@ -15,6 +15,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from csm.learning.describer import Describer
+from csm.learning.places import UNKNOWN
 from csm.learning.samples import NetworkInput, ShapeSample
 
 LOG = logging.getLogger(__name__)
@@ -42,6 +43,7 @@ def learn_twins(module: Describer, samples: Sequence[ShapeSample]) -> bool:
     """
     places = module.places
     assert places is not None
+    places.twins.fill_(UNKNOWN)
     asked = [samples[i] for i in torch.linspace(0, len(samples) - 1, min(SHAPES, len(samples))).long().tolist()]
     functions = functional.normalize(places.functions, dim=1)
     seen, total = [], torch.zeros_like(functions)

@@ -43,6 +43,10 @@ def suited(meshes: Sequence[Mesh], store: Store, device: str = "cpu") -> tuple[M
         The method, why it was chosen, in words, and the meshes as it describes them, if it is the network.
     """
     network = as_method("humans")
+    needed = network.recipe.basis_k if network.recipe else 0
+    if min(mesh.n_vertices for mesh in meshes) < needed:
+        why = f"model=auto: a mesh has fewer than the {needed} vertices that the network humans needs"
+        return as_method("acd"), f"{why}, so the descriptor acd was taken", []
     described = describe_all(network, meshes, store, device)
     share = returning(*described)
     why = f"model=auto: {100 * share:.0f} % of the nearest neighbours of the network humans return to their place"

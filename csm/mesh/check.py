@@ -216,14 +216,8 @@ def _orientation(t: _Topology) -> Iterator[Finding]:
     if edges.size:
         what = "edges whose two faces are oriented against each other"
         yield _found("inconsistent_orientation", "note", what, t.tails[wrong[index]], at="at vertices ")
-    elif t.mesh.n_faces and (t.edge_uses == 2).all() and np.isfinite(t.mesh.corners).all() and _volume(t.mesh) < 0:
+    elif t.mesh.n_faces and (t.edge_uses == 2).all() and np.isfinite(t.mesh.corners).all() and t.mesh.signed_volume < 0:
         yield Finding("inside_out", t.mesh.n_faces, (), "note", "all faces are oriented inwards")
-
-
-def _volume(mesh: Mesh) -> float:
-    """Return the signed volume inside a closed mesh: positive if its faces are counter-clockwise from outside."""
-    centre = mesh.corners.mean(axis=(0, 1))
-    return float(np.einsum("ij,ij->", mesh.corners[:, 0] - centre, mesh.face_crosses) / 6)
 
 
 def _fans(t: _Topology) -> Iterator[Finding]:

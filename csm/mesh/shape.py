@@ -108,6 +108,12 @@ class Mesh:
         """Total surface area, in squared units of `vertices`."""
         return float(self.face_areas.sum())
 
+    @property
+    def signed_volume(self) -> float:
+        """Volume inside a closed surface: positive if its faces are counter-clockwise from outside."""
+        centre = self.corners.mean(axis=(0, 1))
+        return float(np.einsum("ij,ij->", self.corners[:, 0] - centre, self.face_crosses) / 6)
+
     @cached_property
     def digest(self) -> str:
         """SHA-256 (hex) of the geometry: vertex and face bytes and their counts; the name plays no part."""

@@ -131,6 +131,8 @@ def test_a_shape_that_the_split_names_and_the_set_lacks_is_reported(toys, tmp_pa
         data.test_names(toys)
     with pytest.raises(DataError, match=r"1 of the 1 validation shapes of split mine are missing \(toy97\)"):
         module(toys, tmp_path, Split("mine", ("toy0",), ("toy1",), validation=("toy97",))).prepare()
+    held = Split("mine", ("toy0", "toy1"), ("toy2",), validation=("toy97",))
+    module(toys, tmp_path, held, holdout=1).prepare()  # others are held out, so those are not needed
 
 
 def test_all_shapes_that_cannot_be_used_are_reported_together(tmp_path):

@@ -123,6 +123,8 @@ def test_settings_that_do_not_fit_are_errors_of_the_user(tmp_path):
     two = partial(L.Trainer, **(QUICK | {"devices": 2}))
     with pytest.raises(ConfigError, match=r"trainer\.devices=2, .*several devices train together with trainer=ddp"):
         fit(a_training(tmp_path, trainer=two), tmp_path / "run")
+    with pytest.raises(ConfigError, match=r"trainer\.precision=64-true: .*wanted 32-true"):
+        fit(a_training(tmp_path, trainer=partial(L.Trainer, **(QUICK | {"precision": "64-true"}))), tmp_path / "run")
     with pytest.raises(ConfigError, match=r"data\.basis_k=64"):
         fit(a_training(tmp_path, network=NETWORK | {"ks": 64}), tmp_path / "run")
     with pytest.raises(ConfigError, match="descriptor=xyz"):

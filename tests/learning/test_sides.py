@@ -71,6 +71,12 @@ def test_a_body_that_is_mirrored_as_a_whole_is_turned_back(body, rows, twins):
     np.testing.assert_array_equal(mend(body, rows, twins, twins), np.arange(body.n_vertices))
 
 
+def test_nothing_is_mended_where_faces_look_inwards(body, rows, twins):
+    inwards = Mesh(body.vertices, body.faces[:, ::-1], "inwards")
+    assert body.signed_volume > 0 > inwards.signed_volume
+    np.testing.assert_array_equal(mend(inwards, rows, twins, twins), twins)
+
+
 def test_a_small_part_is_left_alone(body, rows, twins):
     hand = body.vertices[:, 0] > np.quantile(body.vertices[:, 0], 0.998)
     assert 0 < vertex_areas(body)[hand].sum() < LEAST * body.area

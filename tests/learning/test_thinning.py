@@ -94,6 +94,14 @@ def test_an_export_has_one_key_and_needs_its_classifier(module, tmp_path):
         load_module(file)
 
 
+@pytest.mark.parametrize("twins", [torch.full((162,), 162), torch.cat([torch.tensor([-1]), torch.arange(161)])])
+def test_twins_that_are_no_points_of_the_template_are_refused(module, tmp_path, twins):
+    changed = copy.deepcopy(module)
+    changed.places.twins.copy_(twins)
+    with pytest.raises(DataError, match=r"model\.json: the weights are damaged.*places\.twins does not hold"):
+        load_module(export_module(changed, tmp_path))
+
+
 def test_numbers_that_half_precision_cannot_hold_are_refused(loaded, tmp_path):
     large = make(loaded)
     with torch.no_grad():

@@ -15,11 +15,18 @@ from tests.shapes import blob
 def test_the_network_is_taken_where_its_neighbours_return(tmp_path, monkeypatch, share, name):
     monkeypatch.setattr(module, "returning", lambda *_: share)
     monkeypatch.setattr(type(as_method("humans")), "describe", lambda *_: None)
-    method, why, described = suited([blob(2), blob(2)], Store(tmp_path))
+    method, why, described = suited([blob(3), blob(3)], Store(tmp_path))
     assert method.name == name
     assert len(described) == (2 if name == "humans" else 0)
     assert why.startswith(f"model=auto: {100 * share:.0f} % of the nearest neighbours")
     assert ("model=null" if name == "humans" else "model=humans") in why
+
+
+def test_meshes_that_are_too_small_for_the_network_are_for_the_descriptor(tmp_path, monkeypatch):
+    monkeypatch.setattr(type(as_method("humans")), "describe", lambda *_: pytest.fail("it wants 256 vertices"))
+    method, why, described = suited([blob(3), blob(2)], Store(tmp_path))
+    assert (method.name, described) == ("acd", [])
+    assert "fewer than the 256 vertices" in why
 
 
 def test_a_match_says_what_was_chosen(tmp_path, monkeypatch):
