@@ -88,11 +88,11 @@ def load_module(path: str | os.PathLike[str]) -> Describer:
     except Exception as error:  # a foreign file can trip the readers in any way
         why = (str(error) or type(error).__name__).splitlines()[0]
         raise DataError(f"{path}: not a checkpoint of csm ({why})") from error
-    if found.places is not None:
-        try:
-            found.places.require_whole()
-        except ConfigError as error:
-            raise DataError(f"{path}: the weights are damaged, or were changed: {error}") from error
+    if found.places is not None and not found.places.is_whole:
+        raise DataError(
+            f"{path}: the weights are damaged, or were changed: places.twins does not hold a point of the template, "
+            f"0 to {len(found.places.twins) - 1}, for each of them"
+        )
     return found
 
 

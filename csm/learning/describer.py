@@ -126,6 +126,10 @@ class Describer(nn.Module):
         x = features if self.inputs is None else self.inputs(features)
         return self.network.describe(self.variation(x), surface)
 
+    def mirrored(self, features: Tensor) -> Tensor:
+        """Return the input features of the mirror image of a shape, of its own, shape (N, P)."""
+        return features[:, self.image_columns.to(features.device)]
+
     @torch.no_grad()
     def descriptor(self, last: Tensor, given: NetworkInput, mesh: Mesh | None = None) -> Tensor:
         """Return the learned descriptor in evaluation mode, shape (N, Q): the network's last layer, or the places.
@@ -148,8 +152,7 @@ class Describer(nn.Module):
         if not self.mirror or not self.places.has_twins:
             plain: Tensor = self.places(last, classifier)
             return plain
-        columns = self.image_columns.to(given.features.device)
-        image = self.last_layer(given._replace(features=given.features[:, columns]))
+        image = self.last_layer(given._replace(features=self.mirrored(given.features)))
         rows = self._read(last, mesh, image=False) + self._read(image, mesh, image=True)
         found: Tensor = functional.normalize(rows, dim=1)
         return found

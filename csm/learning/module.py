@@ -132,8 +132,7 @@ class CSMModule(Describer, L.LightningModule):
         """Return the shape or its mirror image, whose points are those of a template of its own."""
         if not self.mirror or torch.rand(()).item() >= self.mirror:
             return sample
-        image = sample.features[:, self.image_columns]
-        return sample._replace(features=image, template=mirrored_template(sample.template))
+        return sample._replace(features=self.mirrored(sample.features), template=mirrored_template(sample.template))
 
     def validation_step(self, sample: ShapeSample) -> Tensor:
         """Return the learned descriptor of one shape; the loss is logged, the errors are a callback's business."""

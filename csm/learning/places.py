@@ -22,7 +22,6 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from csm.errors import ConfigError
 from csm.learning.samples import ShapeSample
 from csm.mesh.shape import Mesh
 
@@ -90,12 +89,11 @@ class Places(nn.Module):
         """Whether the template's left and right are known."""
         return bool((self.twins != UNKNOWN).all())
 
-    def require_whole(self) -> None:
-        """Raise a ConfigError if the twins are not points of the template whose places are known, or all unknown."""
-        n, none = len(self.twins), bool((self.twins == UNKNOWN).all())
-        known = bool(((self.twins >= 0) & (self.twins < n)).all() and self.normals.any())
-        if not none and not known:
-            raise ConfigError(f"places.twins does not hold a point of the template, 0 to {n - 1}, for each of them")
+    @property
+    def is_whole(self) -> bool:
+        """Whether the twins are points of a template whose surface is known, or all unknown."""
+        among = (self.twins >= 0) & (self.twins < len(self.twins))
+        return bool((self.twins == UNKNOWN).all() or (among.all() and self.normals.any()))
 
     def learn(self, sample: ShapeSample, mesh: Mesh) -> None:
         """Take the surface of a shape for that of the template; points that the shape lacks have zeros.

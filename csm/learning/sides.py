@@ -65,10 +65,12 @@ def mended(reading: Reading, other: Callable[[], Reading], mesh: Mesh) -> Tensor
     if mesh.signed_volume < 0:
         return reading.rows
     shape = _Shape(mesh)
-    turned = shape.large(shape.smooth(_turns(mesh, reading)) < 0)
+    turns = _turns(mesh, reading)
+    turned = shape.large(shape.smooth(turns) < 0)
     if not turned:
         return reading.rows
-    sides = _Sides(shape, reading, other())
+    there = other()
+    sides = _Sides(shape, (reading, there), (turns, _turns(mesh, there)))
     found = np.zeros(mesh.n_vertices, bool)
     best = sides.cost(found)
     for part in turned:
@@ -128,11 +130,11 @@ class _Shape:
 class _Sides:
     """A shape on the template, each of whose vertices can be on either side."""
 
-    def __init__(self, shape: _Shape, here: Reading, there: Reading) -> None:
-        self.shape, self.readings = shape, (here, there)
+    def __init__(self, shape: _Shape, readings: tuple[Reading, Reading], turns: tuple[FloatArray, FloatArray]) -> None:
+        self.shape, self.readings = shape, readings
         units = (functional.normalize(reading.rows, dim=1).float().cpu().numpy() for reading in self.readings)
         self.units: tuple[FloatArray, ...] = tuple(units)
-        self.over = [(_turns(shape.mesh, reading) < 0) for reading in self.readings]
+        self.over = [each < 0 for each in turns]
 
     def rows(self, sides: BoolArray) -> Tensor:
         """Return the places of the vertices, shape (N, K); `sides` is true where they are on the other side."""

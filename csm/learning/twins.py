@@ -71,8 +71,7 @@ def learn_twins(module: Describer, samples: Sequence[ShapeSample]) -> bool:
 def _places_in_image(module: Describer, sample: ShapeSample) -> Tensor:
     """Return where the classifier sees the known points of a shape in its mirror image, shape (R, K)."""
     assert module.places is not None
-    image = NetworkInput(sample.features[:, module.image_columns.to(sample.features.device)], sample.surface)
-    last = module.last_layer(image)
+    last = module.last_layer(NetworkInput(module.mirrored(sample.features), sample.surface))
     found: Tensor = module.places(last[sample.rows.to(last.device)], module.network.classifier)
     return found
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from csm.data.registry import find_set
 from csm.errors import ConfigError, DataError
+from csm.evaluation.metrics import far_rate
 from csm.evaluation.protocol import EvaluationProtocol, Pair
 from csm.evaluation.results import Evaluation
 from csm.matching.methods import Method
@@ -136,7 +137,7 @@ def _row(method: str, matcher: str, cells: Mapping[str, Evaluation]) -> dict[str
         pairs = np.array([pair.age for pair in e.rows])
         row[title] = round(1000 * e.summary["age"], 1)
         row[f"{title} good %"] = round(100 * float((pairs < GOOD).mean()))
-        row[f"{title} far %"] = round(100 * float((e.errors > 0.1).mean()), 2)
+        row[f"{title} far %"] = round(100 * far_rate(e.errors), 2)
         unseen = np.array([not (_tuned_on(title, pair.source) or _tuned_on(title, pair.target)) for pair in e.rows])
         if unseen.any() and not unseen.all():
             row[f"{title} unseen"] = round(1000 * float(pairs[unseen].mean()), 1)

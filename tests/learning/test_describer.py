@@ -8,8 +8,8 @@ import torch
 from csm.errors import ConfigError
 from csm.learning.describer import Describer
 from csm.learning.loading import LightningData
-from csm.learning.samples import NetworkInput, also_classes
-from tests.learning.toys import make
+from csm.learning.samples import NetworkInput
+from tests.learning.toys import make_placed
 from tests.toyset import toy_datamodule
 
 
@@ -22,10 +22,8 @@ def loaded(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def module(loaded):
-    made = make(loaded, places=16, mirror=0.5, also_classes=also_classes(loaded.data, mirror=True), standardise=True)
-    sample = loaded.sample(loaded.data.fit_names[0])
-    made.places.learn(sample, loaded.data.shape(sample.name).mesh)
-    made.inputs.learn([sample.features])
+    made = make_placed(loaded)
+    made.inputs.learn([loaded.sample(loaded.data.fit_names[0]).features])
     return made
 
 

@@ -10,10 +10,10 @@ from safetensors.torch import load_file, save_file
 from csm.errors import ConfigError, DataError
 from csm.learning.checkpoint import export_module, load_module
 from csm.learning.loading import LightningData
-from csm.learning.samples import NetworkInput, also_classes
+from csm.learning.samples import NetworkInput
 from csm.learning.thinning import thinned
 from csm.matching.network import load_model
-from tests.learning.toys import make
+from tests.learning.toys import make, make_placed
 from tests.toyset import toy_datamodule
 
 
@@ -26,9 +26,7 @@ def loaded(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def module(loaded):
-    made = make(loaded, places=16, mirror=0.5, also_classes=also_classes(loaded.data, mirror=True), standardise=True)
-    made.places.learn(loaded.sample(loaded.data.fit_names[0]), loaded.data.shape(loaded.data.fit_names[0]).mesh)
-    return made
+    return make_placed(loaded)
 
 
 def described(network, loaded):

@@ -12,6 +12,7 @@ from csm.data.base import DataModule
 from csm.descriptors.base import record
 from csm.learning.loading import LightningData
 from csm.learning.module import CSMModule
+from csm.learning.samples import also_classes
 
 NETWORK = {"name": "csmcnn", "channels": [16, 16, 16], "descriptor_channels": 24, "ks": 20, "terms": 4, "dropout": 0.0}
 QUICK: dict[str, Any] = {
@@ -33,6 +34,15 @@ def make(loaded: LightningData, **options: Any) -> CSMModule:
         record(data.recipe.descriptor),
         **settings,
     )
+
+
+def make_placed(loaded: LightningData) -> CSMModule:
+    """Return a module that describes by places and knows mirror images, with its first shape for the template."""
+    others = also_classes(loaded.data, mirror=True)
+    made = make(loaded, places=16, mirror=0.5, also_classes=others, standardise=True)
+    first = loaded.data.fit_names[0]
+    made.places.learn(loaded.sample(first), loaded.data.shape(first).mesh)
+    return made
 
 
 def train(module: CSMModule, loaded: LightningData, folder: Path, epochs: int = 12, **options: Any) -> Trainer:
