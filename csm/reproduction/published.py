@@ -114,6 +114,8 @@ _ROWS = {
     "acd": "ACD alone",
     "acd_mgcn": "ACD + MGCN",
     "diffusionnet": "ACD + DiffusionNet",
+    "acscnn_own_input": "ACSCNN on the input of csm's own network",
+    "diffusionnet_own_input": "DiffusionNet on the input of csm's own network",
 }
 
 
