@@ -21,7 +21,7 @@ SETTINGS = {
         "data.root=FOLDER": "of the meshes, or of the data sets below which the set is; the built-in humans need none",
         "data.split=NAME": "which shapes train, validate and test: one of the set's splits, or a json file of your own",
         "data.holdout=10": "validate on this many training shapes, the last ones, which are then not fitted",
-        "data.also=[remeshed_5000]": "more training shapes: with other triangles, bodies.npz of csm bodies, or humans",
+        "data.also=[remeshed_5000]": "more training shapes: other triangles, cut_30 (percent), bodies.npz, or humans",
         "data.test=[remeshed_5000]": "sets to test on, by their names; data.test_roots=[FOLDER] with data=folder",
         "data.basis_k=128": "eigenpairs that are kept of each shape",
         "trainer.max_epochs=50": "how often all training shapes are gone through",

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from importlib import resources
 from pathlib import Path
-from typing import Any, ClassVar, Literal, TypeAlias, get_args, overload
+from typing import Any, ClassVar, overload
 
 import numpy as np
 
@@ -21,12 +21,10 @@ from csm.data.packed import unpack
 from csm.data.shapes import Shape
 from csm.data.splits import Split, as_split
 from csm.data.store import Store
-from csm.data.variants import VariantSet
+from csm.data.variants import FORMS, VariantSet, Variation
 from csm.errors import ConfigError, DataError
 from csm.mesh.correspondence import Direction, PointMap
 from csm.mesh.shape import Mesh
-
-Form: TypeAlias = Literal["original", "refined", "remeshed"]
 
 
 @dataclass(frozen=True)
@@ -160,55 +158,11 @@ def read_asset() -> Arrays:
         return {key: archive[key] for key in archive.files}
 
 
-@dataclass(frozen=True)
 class HumansSet:
-    """The built-in humans over the template of their common connectivity.
+    """The built-in humans over the template of their common connectivity."""
 
-    Parameters
-    ----------
-    variant
-        "original": the shipped meshes; "refined": finer, the original vertices first (as LPS-data does with FAUST);
-        "remeshed": other vertices and triangles altogether (as LRVD does).
-    n_vertices
-        Of the refined or remeshed meshes; 0 for the original ones.
-    store_root
-        Folder of the store that keeps refined and remeshed meshes; None for the default one.
-    seed
-        Of the remeshing.
-    """
-
-    variant: Form = "original"
-    n_vertices: int = 0
-    store_root: str | None = None
-    seed: int = 0
-
+    name: ClassVar[str] = "humans"
     built_in: ClassVar[bool] = True
-
-    @classmethod
-    def parse(cls, text: str, store_root: str | None = None) -> HumansSet:
-        """Make a set from its short name: "original", "refined_10000", "remeshed_5000".
-
-        Raises
-        ------
-        ConfigError
-            If the name has another form.
-
-        Examples
-        --------
-        >>> HumansSet.parse("refined_10000").name
-        'humans_refined_10000'
-        """
-        variant, _, count = text.partition("_")
-        if variant not in get_args(Form) or (variant == "original") != (count == "") or not (count or "0").isdigit():
-            raise ConfigError(
-                f"built-in humans: {text!r} is not the name of a set; wanted original, refined_N or remeshed_N"
-            )
-        return cls(variant, int(count or 0), store_root)  # type: ignore[arg-type]
-
-    @property
-    def name(self) -> str:
-        """Name of the set in results."""
-        return "humans" if self.variant == "original" else f"humans_{self.variant}_{self.n_vertices}"
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -216,12 +170,37 @@ class HumansSet:
         return load_humans().names
 
     def load(self, name: str) -> Shape:
-        """Return one shape; a refined or remeshed one is computed once and kept in the store."""
+        """Return one shape."""
         humans = load_humans()
-        if self.variant != "original":
-            return VariantSet(HumansSet(), self.variant, self.n_vertices, self.store_root, self.seed).load(name)
         mesh = humans.mesh(name)
         return Shape(mesh, PointMap.identity(mesh.n_vertices, name=name), humans.mirror())
+
+
+def humans_set(text: str = "original", store_root: str | None = None) -> HumansSet | VariantSet:
+    """Return the built-in humans by a short name: "original", or another form such as "refined_10000" or "cut_30".
+
+    Parameters
+    ----------
+    text
+        "original", or what `csm.data.variants.Variation.parse` reads.
+    store_root
+        Folder of the store that keeps the other forms; None for the default one.
+
+    Raises
+    ------
+    ConfigError
+        If the name has another form.
+
+    Examples
+    --------
+    >>> humans_set("refined_10000").name
+    'humans_refined_10000'
+    """
+    if text == "original":
+        return HumansSet()
+    if (variation := Variation.parse(text)) is None:
+        raise ConfigError(f"built-in humans: {text!r} is not the name of a set; wanted original, {FORMS}")
+    return VariantSet(HumansSet(), variation, store_root)
 
 
 def _names(persons: Sequence[int], poses: Sequence[int]) -> tuple[str, ...]:
@@ -251,9 +230,9 @@ class HumansDataModule(DataModule):
     Parameters
     ----------
     train
-        Set to train on: "original", or "refined_N" or "remeshed_N" with N vertices.
+        Set to train on, by a name that `humans_set` reads.
     test
-        Sets to test on.
+        Sets to test on, likewise.
     split
         A split, its name, or the path of a split file.
     options
@@ -269,8 +248,8 @@ class HumansDataModule(DataModule):
     ) -> None:
         store: Store | None = options.get("store")
         root = None if store is None else str(store.root)
-        tests = [HumansSet.parse(text, root) for text in test]
-        super().__init__(HumansSet.parse(train, root), tests, as_split(split, SPLITS), **options)
+        tests = [humans_set(text, root) for text in test]
+        super().__init__(humans_set(train, root), tests, as_split(split, SPLITS), **options)
 
 
 DATA_SET = DataSet(HumansDataModule, splits=SPLITS)

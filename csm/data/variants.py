@@ -1,83 +1,173 @@
-"""Other triangulations of meshes and of whole sets, kept in the store."""
+"""Other forms of meshes and of whole sets, kept in the store: other triangles, parts cut away, parts grown together."""
 
 from __future__ import annotations
 
+import zlib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from csm._types import Arrays
+from csm._types import Arrays, IntArray
 from csm.data.shapes import Shape, ShapeSet
 from csm.data.store import Store
+from csm.errors import ConfigError
 from csm.mesh.correspondence import Direction, PointMap
+from csm.mesh.perturb import Damaged, grown_together, without_part
 from csm.mesh.remesh import refine, remesh
 from csm.mesh.shape import Mesh
 
-Variant: TypeAlias = Literal["refined", "remeshed"]
+Variant: TypeAlias = Literal["refined", "remeshed", "cut", "bridged"]
+
+FORMS = "refined_N or remeshed_N with N vertices, cut_P with P percent of the area cut away, or bridged_P"
+"""How the names of variants are written, for messages."""
+
+_PERCENT = ("cut", "bridged")
 
 
-def remeshed(original: Mesh, variant: Variant, n_vertices: int, seed: int, store: Store) -> Arrays:
-    """Return vertices, faces and truth (the vertex of every original one) of another triangulation of a mesh.
-
-    It is computed once and kept in the store.
+@dataclass(frozen=True)
+class Variation:
+    """One way to change every mesh of a set.
 
     Parameters
     ----------
-    original
-        The mesh.
     variant
         "refined": finer, the original vertices first (as LPS-data does with FAUST); "remeshed": other vertices and
-        triangles altogether (as LRVD does).
-    n_vertices
-        Of the result.
+        triangles altogether (as LRVD does); "cut": a part around a drawn vertex is cut away, and the largest piece of
+        the others stays; "bridged": a tube joins the places that are nearest in space among those that are far apart
+        along the surface, as where limbs of a scan touch.
+    amount
+        The number of vertices, of "refined" and "remeshed"; how many percent of the area are cut away; how long the way
+        along the surface is at least that a bridge shortens, in percent of the root of the area.
     seed
-        Of the remeshing.
-    store
-        Where it is kept.
+        Of the draws.
     """
 
-    def make() -> Arrays:
-        made = (refine if variant == "refined" else remesh)(original, n_vertices, seed)
-        return {"vertices": made.mesh.vertices, "faces": made.mesh.faces, "truth": made.truth.indices}
+    variant: Variant
+    amount: int
+    seed: int = 0
 
-    return store.fetch("remesh", original, {"variant": variant, "n_vertices": n_vertices, "seed": seed}, make)
+    def __post_init__(self) -> None:
+        if self.amount < 1 or (self.variant in _PERCENT and self.amount > 99):
+            wanted = "1 to 99 percent" if self.variant in _PERCENT else "1 vertex or more"
+            raise ConfigError(f"{self.variant}_{self.amount}: wanted {wanted}")
+
+    @classmethod
+    def parse(cls, text: str) -> Variation | None:
+        """Return what a name such as "remeshed_5000" says; None if it is not of this form.
+
+        Raises
+        ------
+        ConfigError
+            If it is, with a number that cannot be.
+
+        Examples
+        --------
+        >>> Variation.parse("cut_30")
+        Variation(variant='cut', amount=30, seed=0)
+        >>> Variation.parse("humans") is None
+        True
+        """
+        variant, _, amount = text.partition("_")
+        if variant not in get_args(Variant) or not (amount.isascii() and amount.isdigit()):
+            return None
+        return cls(variant, int(amount))  # type: ignore[arg-type]
+
+    def __str__(self) -> str:
+        return f"{self.variant}_{self.amount}"
+
+    def of(self, original: Mesh, store: Store) -> Arrays:
+        """Return vertices, faces and truth (the vertex of every original one, -1 where it is gone) of the changed mesh.
+
+        It is computed once and kept in the store.  What is cut away depends on the name of the mesh, so that shapes of
+        one set lose different parts.
+
+        Raises
+        ------
+        csm.errors.MeshError
+            If the mesh cannot be changed so.
+        """
+        seed = self.seed + (zlib.crc32(original.name.encode()) if self.variant == "cut" else 0)
+        amount = {"percent" if self.variant in _PERCENT else "n_vertices": self.amount}
+        params = {"variant": self.variant, **amount, "seed": seed}
+        return store.fetch("remesh", original, params, lambda: _MAKERS[self.variant](original, self.amount, seed))
+
+
+def _refined(original: Mesh, n_vertices: int, seed: int) -> Arrays:
+    made = refine(original, n_vertices, seed)
+    return _arrays(made.mesh, made.truth.indices)
+
+
+def _remeshed(original: Mesh, n_vertices: int, seed: int) -> Arrays:
+    made = remesh(original, n_vertices, seed)
+    return _arrays(made.mesh, made.truth.indices)
+
+
+def _cut(original: Mesh, percent: int, seed: int) -> Arrays:
+    centre = int(np.random.default_rng(seed).integers(original.n_vertices))
+    return _damaged(original, without_part(original, centre, percent / 100))
+
+
+def _bridged(original: Mesh, percent: int, seed: int) -> Arrays:
+    return _damaged(original, grown_together(original, percent / 100))
+
+
+_MAKERS: Mapping[Variant, Callable[[Mesh, int, int], Arrays]] = {
+    "refined": _refined,
+    "remeshed": _remeshed,
+    "cut": _cut,
+    "bridged": _bridged,
+}
+
+
+def _damaged(original: Mesh, made: Damaged) -> Arrays:
+    truth = np.full(original.n_vertices, -1)
+    truth[made.kept] = np.arange(len(made.kept))
+    return _arrays(made.mesh, truth)
+
+
+def _arrays(mesh: Mesh, truth: IntArray) -> Arrays:
+    return {"vertices": mesh.vertices, "faces": mesh.faces, "truth": truth}
 
 
 @dataclass(frozen=True, eq=False)
 class VariantSet:
-    """The shapes of a set with other triangulations, computed once and kept in the store.
+    """The shapes of a set in another form, computed once and kept in the store.
 
     Parameters
     ----------
     base
         The set.
-    variant, n_vertices, seed
-        As of `remeshed`.
+    variation
+        What is changed.
     store_root
         Folder of the store; None for the default one.
     """
 
     base: ShapeSet
-    variant: Variant
-    n_vertices: int
+    variation: Variation
     store_root: str | None = None
-    seed: int = 0
 
     @property
     def name(self) -> str:
         """Name of the set, such as "FAUST_6890_remeshed_5000"."""
-        return f"{self.base.name}_{self.variant}_{self.n_vertices}"
+        return f"{self.base.name}_{self.variation}"
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the shapes, which are those of the base."""
         return self.base.names
 
+    @property
+    def built_in(self) -> bool:
+        """Whether the shapes come with csm."""
+        return bool(getattr(self.base, "built_in", False))
+
     def load(self, name: str) -> Shape:
-        """Return one shape; points of the template that the base does not know stay unknown."""
+        """Return one shape; points of the template that the base does not know, or that are cut away, are unknown."""
         original = self.base.load(name)
-        made = remeshed(original.mesh, self.variant, self.n_vertices, self.seed, Store(self.store_root))
+        made = self.variation.of(original.mesh, Store(self.store_root))
         mesh = Mesh(made["vertices"], made["faces"], name)
 
         def carried(known: PointMap) -> PointMap:

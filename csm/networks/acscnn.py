@@ -99,6 +99,9 @@ class ACSCNN(ConvolutionalNetwork):
         less on the resolution of the mesh.
     dropout
         Dropout between the learned descriptor and the classifier.
+    lift_channels
+        Width of a linear layer with ReLU before the convolutions, as CSMCNN has one; 0 for none, as published.  With it
+        an input of many columns costs no more than one of so many.
 
     References
     ----------
@@ -119,9 +122,13 @@ class ACSCNN(ConvolutionalNetwork):
         sweeps: int = 10,
         smoothing: float = 0.08,
         dropout: float = 0.5,
+        lift_channels: int = 0,
     ) -> None:
         super().__init__()
-        widths = itertools.pairwise((in_channels, *channels))
+        if lift_channels < 0:
+            raise ValueError(f"ACSCNN: lift_channels is 0 for none, or a width, got {lift_channels}")
+        self.lift = nn.Linear(in_channels, lift_channels) if lift_channels else None
+        widths = itertools.pairwise((lift_channels or in_channels, *channels))
         self.convs = nn.ModuleList(ACSConv(a, b, terms, angles) for a, b in widths)
         self.norms = nn.ModuleList(nn.BatchNorm1d(width) for width in channels)
         self.embed = nn.Linear(channels[-1], descriptor_channels)
@@ -135,6 +142,10 @@ class ACSCNN(ConvolutionalNetwork):
     def operators(self, surface: Surface, dtype: torch.dtype) -> tuple[Any, ...]:
         """Return the anisotropic Laplacians of all angles, and the square roots of the vertex areas, shape (N, 1)."""
         return laplacians_of(surface), surface.basis.mass.sqrt()[:, None]
+
+    def lifted(self, x: Tensor, surface: Surface) -> Tensor:
+        """Return the input of the first convolution, shape (N, P) or (N, lift_channels)."""
+        return x if self.lift is None else torch.relu(self.lift(x))
 
     def activated(self, x: Tensor, layer: int, surface: Surface) -> Tensor:
         """Return the output `x`, shape (N, C), of a layer after batch normalisation (of convolutions only) and ReLU."""

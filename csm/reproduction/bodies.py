@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal, TypeAlias, get_args
 
 from csm._types import Float32Array
-from csm.data.humans import HumansSet
+from csm.data.humans import HumansSet, humans_set
 from csm.data.prepare import Recipe, features_of, shared_operators
 from csm.data.registry import find_set
 from csm.data.shapes import Shape, ShapeSet
@@ -81,9 +81,9 @@ def built_in_bodies(store: Store) -> Bodies:
     """Return the built-in humans, refined to 10,000 and 15,000 vertices and remeshed to 5,000."""
     root = str(store.root)
     others = {
-        "10,000 vertices": HumansSet("refined", 10000, root),
-        "15,000 vertices": HumansSet("refined", 15000, root),
-        "5,000 vertices, remeshed": HumansSet("remeshed", 5000, root),
+        "10,000 vertices": humans_set("refined_10000", root),
+        "15,000 vertices": humans_set("refined_15000", root),
+        "5,000 vertices, remeshed": humans_set("remeshed_5000", root),
     }
     landmarks = {"left hand": 4395, "left knee": 5874, "head": 242}
     return Bodies("built-in humans", HumansSet(), others, "s08_p02", "s08_p04", "s07_p00", landmarks, "z")

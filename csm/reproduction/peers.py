@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from csm._extras import install_line
 from csm._progress import progress_bar
 from csm._types import Arrays, IntArray
-from csm.data.humans import HumansSet
+from csm.data.humans import humans_set
 from csm.data.registry import find_set
 from csm.data.shapes import Shape, ShapeSet
 from csm.errors import ConfigError, DataError
@@ -34,7 +34,9 @@ GOOD = 0.03
 DISTRIBUTIONS = {"pyFM": "pyfmaps", "geomfum": "geomfum"}
 """Package that a competitor imports -> what it is called where it is installed from."""
 
-HUMANS = HumansSet("remeshed", 5000)
+HUMANS = "remeshed_5000"
+"""Form of the built-in humans that is matched where no published set is found."""
+
 _COLUMNS = ("set", "method", "mean error", "median error", "pairs below 30", "seconds", "ratio", "MB")
 
 
@@ -131,7 +133,7 @@ class Peers(Study):
             drawn.append(Drawn(SETS[key], shapes, self._protocol(context, pairs).choose(names)))
         if drawn:
             return drawn
-        humans = HumansSet(HUMANS.variant, HUMANS.n_vertices, str(context.store.root))
+        humans = humans_set(HUMANS, str(context.store.root))
         protocol = EvaluationProtocol(sample=self.sample, seed=context.seed)
         return [Drawn("built-in humans", humans, protocol.choose(humans.names))]
 

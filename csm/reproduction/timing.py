@@ -20,7 +20,7 @@ from csm._progress import progress_bar
 from csm._types import Arrays, FloatArray, IntArray
 from csm.data.humans import HumansSet
 from csm.data.registry import find_set
-from csm.data.variants import Variant, remeshed
+from csm.data.variants import Variation
 from csm.descriptors.base import record
 from csm.descriptors.presets import from_parameters, preset
 from csm.errors import ConfigError, DataError
@@ -63,9 +63,9 @@ def timed_mesh(context: Context, size: int) -> tuple[Mesh, str]:
     except DataError:
         humans = HumansSet()
         original, whence = humans.load(humans.names[0]).mesh, f"built-in human {humans.names[0]}"
-    variant: Variant = "refined" if size > original.n_vertices else "remeshed"
-    arrays = remeshed(original, variant, size, context.seed, context.store)
-    return Mesh(arrays["vertices"], arrays["faces"], original.name), f"{whence}, {variant}"
+    variation = Variation("refined" if size > original.n_vertices else "remeshed", size, context.seed)
+    arrays = variation.of(original, context.store)
+    return Mesh(arrays["vertices"], arrays["faces"], original.name), f"{whence}, {variation.variant}"
 
 
 def measured(

@@ -21,7 +21,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from csm.data.humans import HumansSet
+from csm.data.humans import humans_set
 from csm.data.registry import find_set
 from csm.data.shapes import ShapeSet
 from csm.descriptors.acd import ACD
@@ -66,7 +66,7 @@ class _OnTrainingPairs(OnPoints):
             return find_set(context.root, "FAUST_5k_remeshed")
         except DataError as error:
             _log.info("the built-in humans are taken: %s", error)
-            return HumansSet("remeshed", 5000, str(context.store.root))
+            return humans_set("remeshed_5000", str(context.store.root))
 
     def errors(self, context: Context, settings: Mapping[K, Descriptor]) -> dict[K, dict[str, Any]]:
         """Return the numbers of each setting for a table: error, standard error, and the error of each pair."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from csm.data.humans import SPLITS, HumansDataModule, HumansSet, load_humans
+from csm.data.humans import SPLITS, HumansDataModule, HumansSet, humans_set, load_humans
 from csm.data.splits import Split
 from csm.data.store import Store
 from csm.descriptors import HKS
@@ -84,20 +84,20 @@ def test_an_unknown_name_is_refused() -> None:
 
 
 def test_the_original_is_its_own_truth() -> None:
-    shape = HumansSet.parse("original").load(NAME)
+    shape = humans_set("original").load(NAME)
     np.testing.assert_array_equal(shape.truth.indices, np.arange(shape.mesh.n_vertices))
 
 
 def test_refined_keeps_the_original_vertices_first(store: str) -> None:
     original = HumansSet().load(NAME).mesh
-    refined = HumansSet.parse(f"refined_{original.n_vertices + 300}", store).load(NAME)
+    refined = humans_set(f"refined_{original.n_vertices + 300}", store).load(NAME)
     assert refined.mesh.n_vertices == original.n_vertices + 300
     np.testing.assert_allclose(refined.mesh.vertices[refined.truth.indices], original.vertices)
 
 
 def test_remeshed_has_other_vertices_close_to_those_they_stand_for(store: str) -> None:
     original = HumansSet().load(NAME).mesh
-    other = HumansSet.parse("remeshed_2000", store).load(NAME)
+    other = humans_set("remeshed_2000", store).load(NAME)
     assert other.mesh.n_vertices == pytest.approx(2000, rel=0.02)
     off = np.linalg.norm(other.mesh.vertices[other.truth.indices] - original.vertices, axis=1)
     edge = np.sqrt(other.mesh.area / other.mesh.n_faces) * 1.5
@@ -107,12 +107,12 @@ def test_remeshed_has_other_vertices_close_to_those_they_stand_for(store: str) -
 
 def test_the_mirror_is_the_truth_after_the_flip_of_the_template(store: str) -> None:
     flip = HumansSet().load(NAME).mirror.indices
-    other = HumansSet.parse("remeshed_2000", store).load(NAME)
+    other = humans_set("remeshed_2000", store).load(NAME)
     np.testing.assert_array_equal(other.mirror.indices, other.truth.indices[flip])
 
 
 def test_a_variant_is_computed_once(store: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    wanted = HumansSet.parse("remeshed_2000", store)
+    wanted = humans_set("remeshed_2000", store)
     first = wanted.load(NAME)
     monkeypatch.setattr("csm.data.variants.remesh", None)
     assert wanted.load(NAME).mesh.digest == first.mesh.digest
@@ -120,8 +120,8 @@ def test_a_variant_is_computed_once(store: str, monkeypatch: pytest.MonkeyPatch)
 
 @pytest.mark.parametrize("text", ["", "originals", "original_5", "refined", "refined_many", "remeshed_-3"])
 def test_other_names_are_refused(text: str) -> None:
-    with pytest.raises(ConfigError, match="wanted original, refined_N or remeshed_N"):
-        HumansSet.parse(text)
+    with pytest.raises(ConfigError, match="wanted original, refined_N or remeshed_N with N vertices, cut_P"):
+        humans_set(text)
 
 
 def test_refined_and_remeshed_humans_are_tested_on(store: str) -> None:

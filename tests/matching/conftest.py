@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from csm._types import IntArray
-from csm.data.humans import HumansSet
+from csm.data.humans import humans_set
 from csm.data.shapes import Shape
 from csm.data.store import Store
 from csm.operators import Spectrum
@@ -22,13 +22,13 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
 @pytest.fixture(scope="session")
 def small_human(store: Store) -> Shape:
     """A built-in human in a triangulation of 700 vertices, with the flip of both sides."""
-    return HumansSet("remeshed", 700, str(store.root)).load("s00_p00")
+    return humans_set("remeshed_700", str(store.root)).load("s00_p00")
 
 
 @pytest.fixture(scope="session")
 def small_humans(store: Store, small_human: Shape) -> list[Shape]:
     """The same person in two poses."""
-    return [small_human, HumansSet("remeshed", 700, str(store.root)).load("s00_p03")]
+    return [small_human, humans_set("remeshed_700", str(store.root)).load("s00_p03")]
 
 
 @pytest.fixture(scope="session")

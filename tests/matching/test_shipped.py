@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from csm.data.humans import HumansSet
+from csm.data.humans import HumansSet, humans_set
 from csm.data.registry import recognise
 from csm.data.shapes import ShapeSet
 from csm.data.store import Store
@@ -53,7 +53,7 @@ def test_held_out_people_are_matched(tmp_path):
 
 @pytest.mark.long
 def test_held_out_people_are_matched_with_other_triangles(tmp_path):
-    assert error(HumansSet.parse("remeshed_5000", str(tmp_path)), HELD_OUT, Store(tmp_path)) < 12
+    assert error(humans_set("remeshed_5000", str(tmp_path)), HELD_OUT, Store(tmp_path)) < 12
 
 
 @pytest.mark.data

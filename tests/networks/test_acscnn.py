@@ -85,6 +85,14 @@ def test_the_network_runs_and_every_parameter_learns(surface):
     assert all(p.grad is not None and torch.isfinite(p.grad).all() and p.grad.abs().max() > 0 for p in net.parameters())
 
 
+def test_a_layer_before_the_convolutions_keeps_them_narrow(surface):
+    network = ACSCNN(688, 20, lift_channels=6, **SMALL).double()
+    assert network.convs[0].weight.shape[1] == 3 * 6
+    assert network(torch.randn(162, 688).double(), surface).shape == (162, 20)
+    with pytest.raises(ValueError, match="lift_channels is 0 for none"):
+        ACSCNN(5, 20, lift_channels=-1)
+
+
 def test_relabelling_the_vertices_permutes_the_descriptor(surface):
     net = ACSCNN(4, 9, **SMALL).double().eval()
     x, order = torch.randn(162, 4, dtype=torch.float64), torch.randperm(162)

@@ -26,7 +26,7 @@ def context(tmp_path) -> Context:
 def calls(monkeypatch) -> list[tuple[str, int]]:
     """Toys for humans, and competitors that give the truth, or for pyFM a far vertex, at set costs."""
     calls: list[tuple[str, int]] = []
-    monkeypatch.setattr(peers, "HumansSet", lambda *_: Toys())
+    monkeypatch.setattr(peers, "humans_set", lambda *_: Toys())
     everywhere = {name: replace(found, package="csm") for name, found in COMPETITORS.items()}
     monkeypatch.setattr(peers, "COMPETITORS", everywhere)
 
