@@ -12,11 +12,9 @@ from typing import Any
 from omegaconf import DictConfig
 
 from csm.commands.app import command
+from csm.commands.choices import BENCHES
 from csm.commands.reproduce import make_studies
 from csm.errors import ConfigError
-
-BENCHES = {"descriptors": "table2", "networks": "table6", "matching": "benchmark_peers"}
-"""What can be measured, with the study that does it."""
 
 
 def run(cfg: DictConfig) -> dict[str, Any]:

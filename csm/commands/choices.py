@@ -44,6 +44,9 @@ NAMES: Mapping[str, Callable[[], Iterable[str]]] = {
 }
 """Groups that are made from csm's registries -> the names in them."""
 
+BENCHES = {"descriptors": "table2", "networks": "table6", "matching": "benchmark_peers"}
+"""What ``csm bench`` can measure, with the study that does it."""
+
 
 def options_of(group: str) -> list[str]:
     """Return the names that can be chosen of a group: those from a registry, and those of yaml files.

@@ -87,7 +87,8 @@ def help_text(command: str) -> str:
     for group, choice, _ in page.groups:
         if group.startswith("hydra"):
             continue
-        rows = [(f"{group}.{key}={value}", text) for key, value, text in _settings(group, choice)]
+        only = options_of(group) == [choice]  # the settings of others are in SETTINGS, or too many
+        rows = [(f"{group}.{key}={value}", text) for key, value, text in settings_of(group, choice) if only]
         lines += ["", f"settings of the group {group}:", *_table(rows)] if rows else []
     if command in SETTINGS:
         lines += ["", "settings of data and trainer that are changed most (these are examples):"]
@@ -105,11 +106,10 @@ def help_text(command: str) -> str:
     return "\n".join(lines)
 
 
-def _settings(group: str, choice: str) -> list[tuple[str, str, str]]:
-    """Return the settings of the only option of a group."""
-    if options_of(group) != [choice] or not (config_folder() / group / f"{choice}.yaml").is_file():
-        return []
-    lines = (config_folder() / group / f"{choice}.yaml").read_text(encoding="utf-8").splitlines()
+def settings_of(group: str, choice: str) -> list[tuple[str, str, str]]:
+    """Return the settings in the yaml of an option of a group (key, default, words); none without such a file."""
+    file = config_folder() / group / f"{choice}.yaml"
+    lines = file.read_text(encoding="utf-8").splitlines() if file.is_file() else []
     found = (_OPTION.fullmatch(line) for line in lines)
     return [(option["key"], option["value"], option["words"] or "") for option in found if option]
 

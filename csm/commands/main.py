@@ -39,7 +39,8 @@ def usage() -> str:
         f"csm {__version__}: dense correspondence between deformable meshes with spectral descriptors\n\n"
         f"usage: csm COMMAND [key=value ...]\n\n{rows}\n\n"
         "csm COMMAND --help explains the options, --cfg job shows the resolved configuration,\n"
-        "-m key=a,b,c runs every combination. An example that needs no data: csm train experiment=demo"
+        "-m key=a,b,c runs every combination. An example that needs no data: csm train experiment=demo\n"
+        "csm completion bash (zsh, fish) prints what completes these words in that shell."
     )
 
 
@@ -52,12 +53,24 @@ def main() -> None:
     if arguments[0] in ("-V", "--version"):
         print(__version__)
         return
+    if arguments[0] == "completion":
+        _complete(arguments[1:])
+        return
     if arguments[0] not in COMMANDS:
         near = nearest_names(arguments[0], COMMANDS)
         print(f"csm: there is no command {arguments[0]!r}{near}; csm --help lists them", file=sys.stderr)
         sys.exit(2)
     sys.argv = [f"csm {arguments[0]}", *arguments[1:]]
     run_command(arguments[0])
+
+
+def _complete(arguments: list[str]) -> None:
+    from csm.commands import completion
+
+    if (text := completion.run(arguments, [*COMMANDS, "completion"])) is None:
+        print(f"csm completion: wanted {', '.join(completion.SCRIPTS)}, as in csm completion bash", file=sys.stderr)
+        sys.exit(2)
+    print(text, end="")
 
 
 def run_as_program(module: str) -> NoReturn:
