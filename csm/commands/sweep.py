@@ -38,11 +38,11 @@ def _job_number(path: Path) -> tuple[int, str]:
 
 
 def _row(path: Path) -> dict[str, Any]:
+    from csm.experiments.sweeps import given  # every command has this callback, and few end a sweep
+
     record = json.loads(path.read_text())
     record.pop("settings", None)
-    split = [item.lstrip("+~").split("=", 1) for item in record.pop("overrides", ()) if "=" in item]
-    given = {key: value.strip("'") for key, value in split}
-    return {"job": path.parent.name, **given, **record}
+    return {"job": path.parent.name, **given(record.pop("overrides", ())), **record}
 
 
 def write_csv(path: Path, rows: list[dict[str, Any]]) -> None:

@@ -88,17 +88,28 @@ def _job(path: Path) -> SweepJob:
     if not isinstance(record, dict) or "status" not in record:
         raise DataError(f"{path}: not a result of a job: it has no status")
     overrides = [str(text) for text in record.pop("overrides", ())]
-    pairs = [text.lstrip("+~").split("=", 1) for text in overrides if "=" in text]
     numbers = {key: float(value) for key, value in record.items() if isinstance(value, int | float)}
     return SweepJob(
         path.parent.name,
-        {key: value.strip("'") for key, value in pairs},
+        given(overrides),
         numbers,
         str(record.get("status", "ok")),
         str(record.get("error", "")),
         tuple(_losses(path.parent)),
         tuple(overrides),
     )
+
+
+def given(overrides: Sequence[str]) -> dict[str, str]:
+    """Return key -> value of the options of a job as they were typed.
+
+    Examples
+    --------
+    >>> given(["+seed=1", "data.root='a=b'", "~callbacks.panels"])
+    {'seed': '1', 'data.root': 'a=b'}
+    """
+    pairs = (text.lstrip("+~").split("=", 1) for text in overrides if "=" in text)
+    return {key: value.strip("'") for key, value in pairs}
 
 
 def _losses(folder: Path) -> list[float]:
