@@ -29,6 +29,7 @@ from csm.experiments.ranks import NAME, part
 from csm.experiments.report import training_section, write_results
 from csm.experiments.testing import Tested, measure_all, numbers
 from csm.experiments.training import Training, fit
+from csm.learning.loading import UNSEEN
 from csm.matching.base import require_device
 from csm.matching.network import NetworkMethod
 from csm.viewer.html import Section
@@ -44,6 +45,7 @@ def run(cfg: DictConfig) -> dict[str, Any] | None:
     folder = output_folder()
     require_network_of_recipe(cfg, HydraConfig.get().overrides.task)
     training, protocol, matching = make_training(cfg), make_protocol(cfg), matching_of(cfg)
+    require_objective(cfg, training)
     require_device(cfg.device)
     require_results(cfg.results)
     require_sound(training.data, test=cfg.test, exact=protocol.distance == "exact" and not protocol.fallback)
@@ -61,13 +63,42 @@ def run(cfg: DictConfig) -> dict[str, Any] | None:
     print(f"trained for {trained.seconds / 60:.1f} minutes, {trained.parameters:,} parameters: {trained.checkpoint}")
     found = {**about, **trained.measured}
     if not cfg.test:
-        return found
+        return with_objective(found, cfg.objective)
     method = NetworkMethod(trained.module)
     tested = measure_all(method, training.data, protocol, matching=matching, table=cfg.table, device=cfg.device)
     conclude(cfg, tested, f"{training.name}: {method.training.get('protocol')}.", [training_section(trained)])
     if training.logger is not None:
         print(f"log:          {folder}  (tensorboard --logdir {folder})")
-    return found | numbers(tested)
+    return with_objective(found | numbers(tested), cfg.objective)
+
+
+def require_objective(cfg: DictConfig, training: Training) -> None:
+    """Raise a ConfigError if the objective of a sweep is a number that the training will not have."""
+    name = str(cfg.objective or "")
+    if name.startswith(f"{UNSEEN}/"):
+        data, every, epochs = training.data, cfg.trainer.check_val_every_n_epoch, cfg.trainer.max_epochs
+        if not data.validates_unseen or len(data.validation_names) < 2:
+            raise ConfigError(
+                f"objective={name}: no two shapes are held out to validate on, so there is no such number; "
+                "data.holdout=10 holds ten of the training shapes out"
+            )
+        if every and epochs and 0 < epochs < every:
+            raise ConfigError(
+                f"objective={name}: trainer.check_val_every_n_epoch={every} validates later than the last of "
+                f"trainer.max_epochs={epochs}; wanted at most {epochs}"
+            )
+    if name.startswith("age/") and not cfg.test:
+        raise ConfigError(f"objective={name}: test=false leaves it out; wanted test=true, or objective={UNSEEN}/age")
+
+
+def with_objective(found: dict[str, Any], name: str | None) -> dict[str, Any]:
+    """Return the numbers of a job and, as "objective", the one that a sweeper makes small; ConfigError without it."""
+    if name is None:
+        return found
+    if not isinstance(value := found.get(name), int | float):
+        known = ", ".join(key for key, value in found.items() if isinstance(value, int | float))
+        raise ConfigError(f"objective={name}: the job has no such number; it has {known}")
+    return {**found, "objective": value}
 
 
 def make_training(cfg: DictConfig) -> Training:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -119,6 +120,7 @@ def _losses(folder: Path) -> list[float]:
         return []
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
+    logging.getLogger("tensorboard").setLevel(logging.WARNING)  # else it names every log whose end it has reached
     log = EventAccumulator(str(min(places)), size_guidance={"scalars": 0, "images": 1, "tensors": 1}).Reload()
     if not {"train/loss", "epoch"} <= set(log.Tags()["scalars"]):
         return []

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
-import pytest
+import json
 
+import pytest
+import yaml
+
+from csm.commands.train import with_objective
+from csm.errors import ConfigError
 from tests.commands.test_pipeline import SMALL, Bench
 
 TOYS = [*SMALL, "data.root=toys"]
@@ -15,6 +20,10 @@ TOYS = [*SMALL, "data.root=toys"]
         ([*TOYS, "matching=[nope]"], "matching='nope'"),
         ([*TOYS, "device=meta"], "device=meta"),
         ([*TOYS, "metric.distance=nope"], "metric.distance=nope"),
+        ([*TOYS, "objective=val/age"], "objective=val/age: no two shapes are held out"),
+        ([*TOYS, "objective=val/age", "data.holdout=1"], "objective=val/age: no two shapes are held out"),
+        ([*TOYS, "objective=val/age", "data.holdout=2", "trainer.max_epochs=9"], "wanted at most 9"),
+        ([*TOYS, "objective=age/toys", "test=false"], "objective=age/toys: test=false leaves it out"),
         (["recipe=acscnn", "experiment=humans_paper"], "experiment=humans_paper chooses csmcnn"),
     ],
 )
@@ -25,3 +34,29 @@ def test_an_error_comes_before_the_training(tmp_path, monkeypatch, capsys, argum
     assert stopped.value.code == 2
     assert message in capsys.readouterr().err
     assert not (tmp_path / "run/model.ckpt").exists()
+
+
+def test_a_sweeper_is_told_the_number_that_it_makes_small(tmp_path, monkeypatch):
+    bench = Bench(tmp_path, monkeypatch)
+    bench.run("train", *TOYS, "objective=val/age", "data.holdout=2", "test=false", "hydra.run.dir=run")
+    record = json.loads((tmp_path / "run/result.json").read_text())
+    assert record["objective"] == record["val/age"] > 0
+
+
+def test_an_objective_that_a_job_does_not_have_is_answered_with_those_that_it_has():
+    with pytest.raises(ConfigError, match="objective=val/eag: the job has no such number; it has seconds, val/age"):
+        with_objective({"seconds": 1.0, "checkpoint": "x", "val/age": 0.1}, "val/eag")
+    assert with_objective({"seconds": 1.0}, None) == {"seconds": 1.0}
+
+
+def test_optuna_tries_settings_and_keeps_the_best(tmp_path, monkeypatch):
+    pytest.importorskip("optuna", reason='Optuna is not installed: pip install "csm-correspondence[sweep]"')
+    bench = Bench(tmp_path, monkeypatch)
+    small = [*TOYS, "descriptor=acd_paper", "learning.places=0", "data.holdout=2"]
+    small += ["trainer.max_epochs=2", "trainer.check_val_every_n_epoch=1"]
+    small.remove("model.dropout=0")
+    bench.run("train", "experiment=tune", *small, "hydra.sweeper.n_trials=2", "hydra.sweep.dir=sweep", "-m")
+    best = yaml.safe_load((tmp_path / "sweep/optimization_results.yaml").read_text())
+    jobs = [json.loads((tmp_path / f"sweep/{job}/result.json").read_text()) for job in (0, 1)]
+    assert best["best_value"] == min(job["objective"] for job in jobs)
+    assert len({job["overrides"][0] for job in jobs}) == 2
