@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 
 from csm.commands.choices import BENCHES, options_of
 from csm.commands.help import SETTINGS, Page, read_page, settings_of
+from csm.commands.main import COMMANDS, COMPLETION
 from csm.commands.words import PATHS, WORDS
 
 _BASH = """\
@@ -48,25 +49,23 @@ SCRIPTS = {"bash": _BASH, "zsh": _ZSH, "fish": _FISH}
 """Shell -> what it runs to complete the words of csm."""
 
 
-def run(arguments: list[str], commands: list[str]) -> str | None:
+def run(arguments: list[str]) -> str | None:
     """Return what ``csm completion ARGUMENTS`` prints; None if these are not understood.
 
     Parameters
     ----------
     arguments
         A shell, or "words" and the line up to the cursor, for which the shell is answered with a word per line.
-    commands
-        The names of csm's commands.
     """
     match arguments:
         case [shell] if shell in SCRIPTS:
             return SCRIPTS[shell]
         case ["words", line]:
-            return "".join(f"{word}\n" for word in candidates(line, commands))
+            return "".join(f"{word}\n" for word in candidates(line))
     return None
 
 
-def candidates(line: str, commands: list[str]) -> list[str]:
+def candidates(line: str) -> list[str]:
     """Return the words that the last word of a command line can become.
 
     None where that is a path, which the shell completes itself.
@@ -75,21 +74,21 @@ def candidates(line: str, commands: list[str]) -> list[str]:
     ----------
     line
         The command line up to the cursor.
-    commands
-        The names of csm's commands.
 
     Examples
     --------
-    >>> candidates("csm ma", ["match", "matrix", "train"])
-    ['match', 'matrix']
-    >>> candidates("csm match a.off b.off refine=j", ["match"])
+    >>> candidates("csm mat")
+    ['matrix', 'match']
+    >>> candidates("csm match a.off b.off refine=j")
     ['refine=joint']
     """
     _, *before, word = line.split(" ") if " " in line else ["", line]
     before = [part for part in before if part]
     if not before:
-        return [name for name in commands if name.startswith(word)]
-    if before[0] not in commands or word.startswith("-"):
+        return [name for name in (*COMMANDS, COMPLETION) if name.startswith(word)]
+    if before == [COMPLETION]:
+        return [shell for shell in SCRIPTS if shell.startswith(word)]
+    if before[0] not in COMMANDS or word.startswith("-"):
         return []
     key, equals, _ = word.partition("=")
     page = read_page(before[0])

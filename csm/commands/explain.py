@@ -93,9 +93,7 @@ def _explained(error: BaseException, config_name: str) -> str | None:
     if isinstance(error, ValueError) and "Config group override must be" in str(error):
         return "a group takes the name of one of its options, such as descriptor=acd; csm COMMAND --help lists them"
     if isinstance(error, ValueError) and "No trials are completed" in str(error):
-        return (
-            "no job of the sweep ended with a number; their errors are above, and in result.json of every folder"
-        )
+        return "no job of the sweep ended with a number; their errors are above, and in result.json of every folder"
     if isinstance(error, ModuleNotFoundError) and (error.name or "") in _EXTRAS:
         return _extra(str(error.name))
     if isinstance(error, MemoryError):

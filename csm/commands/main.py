@@ -31,6 +31,9 @@ COMMANDS = {
     "bench": "measure what descriptors, networks or whole matchings cost, also beside other libraries",
 }
 
+COMPLETION = "completion"
+"""The word after which a shell is named whose completion is printed; it takes no options, unlike commands."""
+
 
 def usage() -> str:
     """Return the text of ``csm --help``."""
@@ -53,7 +56,7 @@ def main() -> None:
     if arguments[0] in ("-V", "--version"):
         print(__version__)
         return
-    if arguments[0] == "completion":
+    if arguments[0] == COMPLETION:
         _complete(arguments[1:])
         return
     if arguments[0] not in COMMANDS:
@@ -67,7 +70,7 @@ def main() -> None:
 def _complete(arguments: list[str]) -> None:
     from csm.commands import completion
 
-    if (text := completion.run(arguments, [*COMMANDS, "completion"])) is None:
+    if (text := completion.run(arguments)) is None:
         print(f"csm completion: wanted {', '.join(completion.SCRIPTS)}, as in csm completion bash", file=sys.stderr)
         sys.exit(2)
     print(text, end="")
