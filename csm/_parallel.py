@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -48,7 +49,7 @@ def parallel_map(
     function: Callable[[T], R],
     tasks: Iterable[T],
     label: Callable[[T], str],
-    workers: int,
+    workers: int | None,
     *,
     what: str,
     unit: str,
@@ -70,7 +71,8 @@ def parallel_map(
     label
         Names a task in the progress bar and in errors.
     workers
-        Number of processes; up to 1 works in this process.
+        Number of processes; up to 1 works in this process.  None: one per core, from when what is left, by the time
+        that the first tasks took, is worth their start.
     what, unit
         Title and unit of the progress bar.
     total
@@ -120,9 +122,15 @@ def _mark() -> None:
     _here.mapped = True
 
 
+_WORTH = 10.0  # seconds of work that are left; processes import csm first, which takes some
+
+
 def _run(
-    function: Callable[[T], R], tasks: Iterable[T], label: Callable[[T], str], workers: int
+    function: Callable[[T], R], tasks: Iterable[T], label: Callable[[T], str], workers: int | None
 ) -> Iterator[tuple[int, T, R]]:
+    if workers is None:
+        yield from _run_when_worth(function, list(tasks), label)
+        return
     if workers <= 1:
         yield from ((at, task, _on_one_thread(function, task)) for at, task in enumerate(tasks))
         return
@@ -137,6 +145,20 @@ def _run(
                 more = more and not room
             for worker in ready(team, 0 if room else None):
                 yield _take(worker, label)
+
+
+def _run_when_worth(
+    function: Callable[[T], R], tasks: list[T], label: Callable[[T], str]
+) -> Iterator[tuple[int, T, R]]:
+    """Work in this process until the tasks that are left would take it long, and on all cores then."""
+    cores, began = os.cpu_count() or 1, time.perf_counter()
+    for at, task in enumerate(tasks):
+        left = (time.perf_counter() - began) / at * (len(tasks) - at) if at else 0.0
+        if left > _WORTH and len(tasks) - at > 1:
+            for more, one, result in _run(function, tasks[at:], label, cores):
+                yield at + more, one, result
+            return
+        yield at, task, _on_one_thread(function, task)
 
 
 def _least_busy(team: list[Worker], function: Callable[[T], R], workers: int) -> Worker:

@@ -26,7 +26,7 @@ def squares(tasks: list[int], workers: int) -> list[int]:
     return parallel_map(square, tasks, str, workers, what="square", unit="number")
 
 
-@pytest.mark.parametrize("workers", [0, 1, 2])
+@pytest.mark.parametrize("workers", [0, 1, 2, None])
 def test_results_come_in_the_order_of_the_tasks(workers):
     assert squares([3, 1, 2], workers) == [9, 1, 4]
     assert squares([], workers) == []
@@ -42,6 +42,20 @@ def test_workers_are_other_processes_of_one_thread():
     found = parallel_map(process_and_threads, [0, 0], str, 2, what="ask", unit="worker")
     assert os.getpid() not in {process for process, _ in found}
     assert {threads for _, threads in found} == {1}
+
+
+def test_quick_tasks_start_no_processes():
+    found = parallel_map(process_and_threads, range(5), str, None, what="ask", unit="process")
+    assert {process for process, _ in found} == {os.getpid()}
+
+
+def test_long_tasks_start_processes_after_the_first(monkeypatch):
+    monkeypatch.setattr("csm._parallel._WORTH", 0.0)
+    monkeypatch.setattr("csm._parallel.os.cpu_count", lambda: 2)
+    first, *others = parallel_map(process_and_threads, range(4), str, None, what="ask", unit="process")
+    assert first[0] == os.getpid()
+    assert os.getpid() not in {process for process, _ in others}
+    assert squares([3, 1, 2], None) == [9, 1, 4]
 
 
 @pytest.mark.parametrize("workers", [1, 2])

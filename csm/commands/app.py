@@ -77,7 +77,7 @@ def command(config_name: str, *, folder: bool = False, kept: Sequence[str] = ())
         def entry() -> Any:
             arguments = sys.argv[1:]
             if asks_for_help(arguments):
-                print(help_text(config_name))
+                print(help_text(config_name, arguments))
                 return None
             if typed := typed_command():
                 end_with_parent()
@@ -107,7 +107,7 @@ class _errors_told:  # noqa: N801 - reads as a phrase
         if self._debug:
             traceback.print_exception(error)
         if isinstance(error, KeyboardInterrupt):
-            said = str(error) or "what was finished is kept; the same command goes on from there or begins again"
+            said = str(error) or _how_to_go_on(self._config_name)
             print(f"csm: stopped: {said}", file=sys.stderr)
             sys.exit(exit_status(error))
         text = explained(error, self._config_name)
@@ -120,6 +120,14 @@ class _errors_told:  # noqa: N801 - reads as a phrase
             sys.exit(1)
         print(f"csm: {text}", file=sys.stderr)
         sys.exit(2)
+
+
+def _how_to_go_on(config_name: str) -> str:
+    """Say how a command that was stopped is gone on with; the folder of a training is among its arguments by now."""
+    folder = next((text for text in sys.argv if text.startswith("hydra.run.dir=")), "")
+    if config_name == "train" and folder:
+        return f"what was finished is kept; the same command with {folder} goes on from there"
+    return "what was finished is kept; the same command goes on from there or begins again"
 
 
 def _raising(failures: list[Exception], main: Callable[[], Any], config_name: str, own_folder: bool) -> Any:

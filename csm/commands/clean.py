@@ -88,7 +88,7 @@ def report(done: Cleaned, source: Path, target: Path) -> None:
         "nothing had to be mended" if not done.mends else f"{counted(len(done.mends), 'step')} changed the mesh",
         end="; ",
     )
-    print("nothing remains" if not remaining else f"what remains: {'; '.join(remaining)}")
+    print("no problems remain" if not remaining else f"what remains: {'; '.join(remaining)}")
     written = ", ".join(str(path) for path in [*places(target), account_of(target)])
     print(f"{counted(len(done.vertex_map), 'vertex')} -> {done.mesh.n_vertices}: {written}")
 

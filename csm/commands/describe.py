@@ -42,7 +42,6 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     require_file_place(out)
     require_new_in_sweep(out)
     require_not_input([out], [Path(cfg.mesh)])
-    require_new_in_sweep(out)
     require_own_archive(out, ARRAYS, cfg.overwrite)
     descriptor: Descriptor = instantiate(cfg.descriptor)
     subject = subject_of(cfg.mesh, cfg.clean)

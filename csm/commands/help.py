@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 import textwrap
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from csm.commands.choices import config_folder, options_of
+from csm.commands.choices import BENCHES, config_folder, options_of
 from csm.commands.words import LISTS, WORDS
-from csm.reproduction.registry import listing
+from csm.reproduction.registry import STUDIES, explained, listing
+from csm.reproduction.registry import options_of as options_of_study
 
 _OPTION = re.compile(r"(?P<key>\w+):\s*(?P<value>[^#]*?)\s*(?:#\s*(?P<words>.*))?")
 _ITEM = re.compile(
@@ -75,14 +77,29 @@ def _inherit(config_name: str, page: Page) -> None:
     page.groups += above.groups
 
 
-def help_text(command: str) -> str:
-    """Return the help of a command, such as "match"; its yaml has the same name."""
+def help_text(command: str, arguments: Sequence[str] = ()) -> str:
+    """Return the help of a command, such as "match"; its yaml has the same name.
+
+    Parameters
+    ----------
+    command
+        Its name.
+    arguments
+        What else was typed: the studies among it are explained.
+    """
     page = read_page(command)
-    own = sorted(page.options, key=lambda option: option[0] in {key for key, *_ in read_page("common").options})
+    options = {option[0]: option for option in page.options}.values()
+    own = sorted(options, key=lambda option: option[0] in {key for key, *_ in read_page("common").options})
     words = " ".join(f"[{key.upper()} ...]" if key in LISTS else key.upper() for key in WORDS.get(command, ()))
     lines = [f"usage: csm {command} {words} [key=value ...]".replace("  ", " "), ""]
     lines += [*textwrap.wrap(" ".join(page.purpose), _WIDTH), ""]
-    lines += ["studies:", listing(), ""] if command == "reproduce" else []
+    studies = _studies(command, arguments)
+    if command == "reproduce" and not studies:
+        lines += ["studies, each with options of its own (csm reproduce table1 --help):", listing(), ""]
+    for study in studies:
+        known, meaning = options_of_study(study), explained(study)
+        rows = [(f"{study}.{key}={_shown(value)}", meaning[key]) for key, value in known.items()]
+        lines += [f"options of {study}, with their defaults:", *_table(rows), ""]
     lines += ["options, with their defaults:", *_table([(f"{key}={value}", text) for key, value, text in own])]
     for group, choice, _ in page.groups:
         if group.startswith("hydra"):
@@ -104,6 +121,18 @@ def help_text(command: str) -> str:
         "debug=true shows the traceback of an error.",
     ]
     return "\n".join(lines)
+
+
+def _studies(command: str, arguments: Sequence[str]) -> list[str]:
+    """Return the studies that are named among the arguments of a command that makes some."""
+    named = BENCHES if command == "bench" else {name: name for name in STUDIES} if command == "reproduce" else {}
+    return [named[word] for word in arguments if word in named]
+
+
+def _shown(value: object) -> str:
+    """Return a default as it is typed."""
+    text = "null" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
+    return text.replace("'", "").replace(", ", ",")
 
 
 def settings_of(group: str, choice: str) -> list[tuple[str, str, str]]:

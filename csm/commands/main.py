@@ -49,7 +49,15 @@ def usage() -> str:
 
 def main() -> None:
     """Run ``csm``; exit status 2 after an error that the user can mend."""
-    arguments = sys.argv[1:]
+    try:
+        _main(sys.argv[1:])
+        sys.stdout.flush()
+    except BrokenPipeError:  # whoever reads has read enough, as in csm --help | head
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+
+
+def _main(arguments: list[str]) -> None:
     if not arguments or arguments[0] in ("-h", "--help", "help"):
         print(usage())
         return
@@ -95,7 +103,7 @@ def run_command(name: str) -> None:
     if asks_for_help(sys.argv[1:]):
         from csm.commands.help import help_text
 
-        print(help_text(name))
+        print(help_text(name, sys.argv[1:]))
         return
     os.environ["MPLBACKEND"] = "agg"  # pictures go to files; a notebook names a backend that need not be installed here
     try:

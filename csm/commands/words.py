@@ -142,7 +142,23 @@ def _override(argument: str, sweeping: bool) -> str:
         return ""
     if key in PATHS and value not in ("", "null"):
         return f"{key}={_path_value(value, sweeping)}"
+    if _ASSIGNMENTS.fullmatch(value):
+        return f"{key}=[{','.join(map(quoted, _items(value[1:-1])))}]"
     return without_null(argument) if equals else argument
+
+
+_ASSIGNMENTS = re.compile(r"\[[^'\"{}=]+=[^'\"{}]*\]")  # [a=1,b=[2,3]]: to Hydra, = means nothing inside of a list
+
+
+def _items(text: str) -> list[str]:
+    """Return what stands between the commas of a list, but not those of lists in it.
+
+    Examples
+    --------
+    >>> _items("a=1, b=[2,3]")
+    ['a=1', 'b=[2,3]']
+    """
+    return [item.strip() for item in re.split(r",(?![^\[]*\])", text)]
 
 
 def _path_value(value: str, sweeping: bool) -> str:

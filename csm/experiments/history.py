@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Mapping
 from typing import Any, TypeAlias
 
@@ -17,11 +18,25 @@ _TRAINED = "train/loss"
 
 
 class History(L.Callback):
-    """Keep the training loss of every epoch and the numbers of every validation, also when a training goes on later."""
+    """Keep the training loss of every epoch and the numbers of every validation, also when a training goes on later.
+
+    Attributes
+    ----------
+    curves
+        Name of a metric -> epochs, counted from 1, and its values.
+    seconds
+        How long the epochs took, those before an interruption included.
+    """
 
     def __init__(self) -> None:
         self.curves: dict[str, list[tuple[int, float]]] = {}
+        self.seconds = 0.0
         self._validated = False
+        self._since = time.perf_counter()
+
+    def on_fit_start(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
+        """Begin to count the seconds of this part of the training."""
+        self._since = time.perf_counter()
 
     def on_validation_epoch_end(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
         """Note that this epoch has numbers of a validation."""
@@ -35,17 +50,26 @@ class History(L.Callback):
             if new and math.isfinite(float(value)):
                 self.curves.setdefault(name, []).append((trainer.current_epoch + 1, float(value)))
         self._validated = False
+        now = time.perf_counter()
+        self.seconds, self._since = self.seconds + now - self._since, now
 
     def state_dict(self) -> dict[str, Any]:
         """Return the curves as plain data, for checkpoints."""
-        return {"curves": {name: [list(point) for point in curve] for name, curve in self.curves.items()}}
+        curves = {name: [list(point) for point in curve] for name, curve in self.curves.items()}
+        return {"curves": curves, "seconds": self.seconds}
 
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
         """Go on with the curves of a checkpoint."""
         kept = state_dict["curves"]
         self.curves = {name: [(int(epoch), float(v)) for epoch, v in curve] for name, curve in kept.items()}
+        self.seconds = float(state_dict.get("seconds", 0.0))
+
+    @property
+    def last(self) -> dict[str, float]:
+        """The last value of every curve."""
+        return {name: curve[-1][1] for name, curve in self.curves.items()}
 
 
-def curves_of(trainer: L.Trainer) -> Curves:
-    """Return what the `History` of a trainer has kept; nothing if it has none."""
-    return next((c.curves for c in trainer.callbacks if isinstance(c, History)), {})  # type: ignore[attr-defined]
+def history_of(trainer: L.Trainer) -> History:
+    """Return the `History` of a trainer, an empty one if it has none."""
+    return next((c for c in trainer.callbacks if isinstance(c, History)), History())  # type: ignore[attr-defined]

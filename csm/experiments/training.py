@@ -28,7 +28,7 @@ from csm.descriptors.base import record
 from csm.errors import ConfigError
 from csm.evaluation.provenance import provenance
 from csm.experiments.callbacks import EpochLines, FiniteLoss, ValidationErrors, require_monitored
-from csm.experiments.history import Curves, History, curves_of
+from csm.experiments.history import Curves, History, history_of
 from csm.experiments.ranks import (
     SharedStatistics,
     prepare_once,
@@ -156,19 +156,19 @@ def _fit(training: Training, trainer: L.Trainer, folder: Path, resume: Path | st
         module.places.learn(template, training.data.shape(template.name).mesh)
     if trainer.global_rank:
         torch.manual_seed(training.seed + trainer.global_rank)  # weights and order are those of rank 0, dropout is not
-    begun = time.perf_counter()
     with saying(lambda: _what_is_kept(folder, trainer)), _interruptible():
         trainer.fit(module, datamodule=loaded, ckpt_path=begin, weights_only=True)
+    history, ended = history_of(trainer), time.perf_counter()
     if module.places is not None and module.mirror:
         learn_twins(module, [loaded.sample(name) for name in training.data.fit_names])
-    seconds = time.perf_counter() - begun
+    seconds = history.seconds + time.perf_counter() - ended
     module.hparams["training"]["epochs"] = trainer.current_epoch  # fewer than asked for where max_time ended it
     checkpoint = folder / "model.ckpt"
     trainer.save_checkpoint(checkpoint)
     if trainer.is_global_zero:
         export_module(module, folder / "export")
-    measured = {key: float(value) for key, value in trainer.callback_metrics.items()}
-    return Trained(module, checkpoint, seconds, measured, trainer.global_rank, curves_of(trainer))
+    measured = history.last | {key: float(value) for key, value in trainer.callback_metrics.items()}
+    return Trained(module, checkpoint, seconds, measured, trainer.global_rank, history.curves)
 
 
 def shapes_per_step(trainer: L.Trainer) -> int:

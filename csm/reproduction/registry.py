@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -77,6 +79,23 @@ def entry(name: str) -> Entry:
 def options_of(name: str) -> dict[str, Any]:
     """Return the options of a study with their defaults, as plain data."""
     return entry(name).load().options()
+
+
+def explained(name: str) -> dict[str, str]:
+    """Return what the docstring of a study says of each of its options.
+
+    Examples
+    --------
+    >>> explained("refinement")["sample"]
+    'How many pairs of a set are drawn; None for all.'
+    """
+    found: dict[str, str] = {}
+    for cls in reversed(entry(name).load().__mro__):
+        text = inspect.cleandoc(cls.__doc__ or "").partition("Parameters\n----------\n")[2]
+        for block in re.split(r"\n(?=\w)", text.partition("\n\n")[0]):
+            names, _, words = block.partition("\n")
+            found |= dict.fromkeys(names.split(", "), " ".join(words.split()))
+    return {key: found.get(key, "") for key in options_of(name)}
 
 
 def make_study(name: str, options: Mapping[str, Any]) -> Study:

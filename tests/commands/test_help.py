@@ -10,6 +10,7 @@ from csm.commands.choices import config_folder
 from csm.commands.groups import data_configs
 from csm.commands.help import SETTINGS, help_text, read_page
 from csm.commands.main import COMMANDS
+from csm.reproduction.registry import STUDIES, explained
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -52,3 +53,16 @@ def test_no_line_is_wider_than_a_terminal():
 def test_the_program_is_also_a_module():
     words = [sys.executable, "-m", "csm", "--help"]
     assert subprocess.run(words, capture_output=True, text=True, check=True).stdout.startswith("csm ")
+
+
+def test_a_study_that_is_named_has_its_options_explained():
+    text = help_text("bench", ["descriptors", "--help"])
+    assert "table2.repeats=3" in text
+    assert "Measurements, of which the median counts." in text
+    assert text.count("targets=[]") == 1
+    assert "studies, each with" not in help_text("reproduce", ["table1", "--help"])
+
+
+@pytest.mark.parametrize("study", STUDIES)
+def test_every_option_of_every_study_is_explained(study):
+    assert [key for key, words in explained(study).items() if not words] == []

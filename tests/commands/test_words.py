@@ -108,3 +108,12 @@ def test_a_name_like_a_flag_or_a_reference_is_a_path_where_there_is_such_a_file(
 def test_options_with_dashes_are_answered_with_how_they_are_written(typed, meant):
     with pytest.raises(ConfigError, match=f"without dashes, {meant}"):
         to_overrides("match", ["a", "b", typed])
+
+
+def test_overrides_in_a_list_are_quoted_one_by_one():
+    typed = ["overrides=[trainer.max_epochs=1,data.test=[6890,10000]]", "model.channels=[1,2]", "+rows.a=['b=1']"]
+    assert to_overrides("matrix", typed) == [
+        "overrides=['trainer.max_epochs=1','data.test=[6890,10000]']",
+        "model.channels=[1,2]",
+        "+rows.a=['b=1']",
+    ]

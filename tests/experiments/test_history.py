@@ -30,3 +30,10 @@ def test_every_epoch_has_a_loss_and_every_validation_its_errors_also_after_an_in
     again = fit(of(tmp_path, 4), tmp_path / "cut").curves
     for name, curve in whole.curves.items():
         assert again[name] == [(epoch, pytest.approx(value)) for epoch, value in curve]
+
+
+def test_a_training_that_was_finished_has_its_numbers_and_seconds_when_it_is_started_again(tmp_path):
+    first = fit(of(tmp_path, 2), tmp_path / "run")
+    again = fit(of(tmp_path, 2), tmp_path / "run")
+    assert dict(again.measured) == pytest.approx(dict(first.measured))
+    assert again.seconds >= 0.9 * first.seconds > 0

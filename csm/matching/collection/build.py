@@ -72,7 +72,7 @@ def match_collection(
     clean, store, device
         As of `csm.match`.
     workers
-        Processes of one thread; by default one per core.
+        Processes of one thread; by default one per core, where that pays.
     progress
         Show progress bars.
 
@@ -128,7 +128,7 @@ class _Run:
     progress: bool
 
     def __call__(self, function: Any, tasks: Sequence[Any], label: Any, what: str, unit: str) -> list[Any]:
-        n = n_processes(self.workers, len(tasks))
+        n = None if self.workers is None else n_processes(self.workers, len(tasks))
         return parallel_map(function, tasks, label, n, what=what, unit=unit, progress=self.progress)
 
 

@@ -183,7 +183,7 @@ class MatchedCollection:
         pairs
             Sources and targets; all ordered pairs by default.
         workers
-            Processes of one thread; by default one per core.
+            Processes of one thread; by default one per core where that pays.
         progress
             Show a bar with the name of the pair.
         """
@@ -193,7 +193,8 @@ class MatchedCollection:
         found = {pair: self._kept[pair] for pair in both if pair in self._kept}
         missing = [pair for pair in both if pair not in found]
         tasks = [self._task(*pair) for pair in missing]
-        n = n_processes(workers, len(tasks)) if self.members[0].device == "cpu" else 0
+        n = None if workers is None else n_processes(workers, len(tasks))
+        n = n if self.members[0].device == "cpu" else 0
         done = parallel_map(both_maps, tasks, EdgeTask.label_of, n, what="map", unit="pair", progress=progress)
         found |= zip(missing, done, strict=True)
         self._kept.update({pair: maps for pair, maps in found.items() if self.reference_index in pair})
