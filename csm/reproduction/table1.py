@@ -128,11 +128,15 @@ class Table1(Study):
             f"descriptor and target. The standard error of a mean that is due to this is at most {1000 * worst:.2f} "
             "thousandths. The rates of left-right flips in the json are over the points measured exactly."
         )
+        all_exact = self.exact_points is None or (self.points is not None and self.points <= self.exact_points)
+        over = (
+            f"{'all' if self.points is None else 'drawn'} points of {'all' if self.sample is None else 'drawn'} pairs"
+        )
         notes = [
-            "Each cell has the mean error over all points of all pairs ± the standard deviation over pairs. Ranks are "
+            f"Each cell has the mean error over {over} ± the standard deviation over pairs. Ranks are "
             "the paper's / ours, each among the families of this table, of which ACD stands in several settings. Equal "
             "ranks of the paper are ties.",
-            "All distances are exact." if self.exact_points is None else exact,
+            "All distances are exact." if all_exact else exact,
             *(column.note for column in columns.values()),
             "Assumed: what of a descriptor no source says, so that its row is our best guess at what was run; the "
             "parameters are those of the docstrings.",
