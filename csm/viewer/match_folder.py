@@ -143,9 +143,10 @@ def _what_is_shown(match: Match, method: str) -> str:
 
 
 def made_by(match: Match, method: str) -> str:
-    """Say how the map was made: by which neighbour in which descriptor, and what refined it."""
+    """Say how the map was made: by which neighbour or classifier, on which descriptor, and what refined it."""
     rule = match.matcher.name.partition("+")[0]
-    return f"{rule} neighbour in {method}" + (f", {match.refinement}" if match.refinement else "")
+    how = f"{rule} neighbour in" if rule != "argmax" else "the classifier on"
+    return f"{how} {method}" + (f", {match.refinement}" if match.refinement else "")
 
 
 def _account(match: Match, meaning: str, method: str) -> dict[str, Any]:
