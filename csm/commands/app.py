@@ -102,7 +102,7 @@ class _errors_told:  # noqa: N801 - reads as a phrase
         os.environ["HYDRA_FULL_ERROR"] = "1"  # errors come here, instead of being printed by Hydra
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: Any) -> None:
-        if error is None or isinstance(error, SystemExit):
+        if error is None or isinstance(error, SystemExit | BrokenPipeError):
             return
         if self._debug:
             traceback.print_exception(error)

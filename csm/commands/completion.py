@@ -82,6 +82,7 @@ def candidates(line: str) -> list[str]:
     >>> candidates("csm match a.off b.off refine=j")
     ['refine=joint']
     """
+    line = line.lstrip()
     _, *before, word = line.split(" ") if " " in line else ["", line]
     before = [part for part in before if part]
     if not before:

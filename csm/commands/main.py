@@ -51,7 +51,8 @@ def main() -> None:
     """Run ``csm``; exit status 2 after an error that the user can mend."""
     try:
         _main(sys.argv[1:])
-        sys.stdout.flush()
+        if sys.stdout is not None:  # it is closed in csm ... >&-
+            sys.stdout.flush()
     except BrokenPipeError:  # whoever reads has read enough, as in csm --help | head
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
@@ -78,8 +79,12 @@ def _main(arguments: list[str]) -> None:
 def _complete(arguments: list[str]) -> None:
     from csm.commands import completion
 
+    wanted = f"csm completion: wanted {', '.join(completion.SCRIPTS)}, as in source <(csm completion bash)"
+    if asks_for_help(arguments):
+        print(wanted)
+        return
     if (text := completion.run(arguments)) is None:
-        print(f"csm completion: wanted {', '.join(completion.SCRIPTS)}, as in csm completion bash", file=sys.stderr)
+        print(wanted, file=sys.stderr)
         sys.exit(2)
     print(text, end="")
 

@@ -7,6 +7,7 @@ from csm.commands.main import run_as_program
 if __name__ == "__main__":
     run_as_program(__file__)
 
+import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -24,12 +25,13 @@ from csm.commands.processes import is_first, processes_to_start, train_together
 from csm.data.inspection import require_sound
 from csm.errors import ConfigError
 from csm.evaluation.tables import markdown_table
+from csm.experiments.callbacks import ValidationErrors
 from csm.experiments.pairs import worst_line
 from csm.experiments.ranks import NAME, part
 from csm.experiments.report import training_section, write_results
 from csm.experiments.testing import Tested, measure_all, numbers
 from csm.experiments.training import Training, fit
-from csm.learning.loading import UNSEEN
+from csm.learning.loading import FITTED, UNSEEN
 from csm.matching.base import require_device
 from csm.matching.network import NetworkMethod
 from csm.viewer.html import Section
@@ -72,9 +74,22 @@ def run(cfg: DictConfig) -> dict[str, Any] | None:
     return with_objective(found | numbers(tested), cfg.objective)
 
 
+_NUMBERS = ("val/", "fit/", "train/", "step/", "age/", "exact/", "seconds", "parameters")
+_MEASURED = tuple(f"{group}/{name}" for group in (UNSEEN, FITTED) for name in ("age", "exact", "far", "flip"))
+
+
 def require_objective(cfg: DictConfig, training: Training) -> None:
     """Raise a ConfigError if the objective of a sweep is a number that the training will not have."""
-    name = str(cfg.objective or "")
+    if cfg.objective is None:
+        return
+    name = str(cfg.objective)
+    if not name.startswith(_NUMBERS):
+        raise ConfigError(
+            f"objective={name}: no job has a number of that name; wanted one such as val/age, fit/age, train/loss, "
+            "age/SET, exact/SET or seconds"
+        )
+    if name in _MEASURED and not any(isinstance(each, ValidationErrors) for each in training.callbacks):
+        raise ConfigError(f"objective={name}: the callback that measures it was left out; wanted callbacks=default")
     if name.startswith(f"{UNSEEN}/"):
         data, every, epochs = training.data, cfg.trainer.check_val_every_n_epoch, cfg.trainer.max_epochs
         if not data.validates_unseen or len(data.validation_names) < 2:
@@ -92,12 +107,13 @@ def require_objective(cfg: DictConfig, training: Training) -> None:
 
 
 def with_objective(found: dict[str, Any], name: str | None) -> dict[str, Any]:
-    """Return the numbers of a job and, as "objective", the one that a sweeper makes small; ConfigError without it."""
+    """Return the numbers of a job and, as "objective", the one that a sweeper makes small, where it is there."""
     if name is None:
         return found
     if not isinstance(value := found.get(name), int | float):
         known = ", ".join(key for key, value in found.items() if isinstance(value, int | float))
-        raise ConfigError(f"objective={name}: the job has no such number; it has {known}")
+        print(f"csm: objective={name}: the job has no such number; it has {known}", file=sys.stderr)
+        return found
     return {**found, "objective": value}
 
 

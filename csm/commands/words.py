@@ -142,23 +142,32 @@ def _override(argument: str, sweeping: bool) -> str:
         return ""
     if key in PATHS and value not in ("", "null"):
         return f"{key}={_path_value(value, sweeping)}"
-    if _ASSIGNMENTS.fullmatch(value):
-        return f"{key}=[{','.join(map(quoted, _items(value[1:-1])))}]"
+    if items := _assignments(value):
+        return f"{key}=[{','.join(map(quoted, items))}]"
     return without_null(argument) if equals else argument
 
 
-_ASSIGNMENTS = re.compile(r"\[[^'\"{}=]+=[^'\"{}]*\]")  # [a=1,b=[2,3]]: to Hydra, = means nothing inside of a list
-
-
-def _items(text: str) -> list[str]:
-    """Return what stands between the commas of a list, but not those of lists in it.
+def _assignments(value: str) -> list[str]:
+    """Return the items of a list of overrides, in which = means nothing to Hydra without quotes; none of other values.
 
     Examples
     --------
-    >>> _items("a=1, b=[2,3]")
-    ['a=1', 'b=[2,3]']
+    >>> _assignments("[a=1, b=[2,[3]]]"), _assignments("[a=1],[a=2]"), _assignments("[1,2]")
+    (['a=1', 'b=[2,[3]]'], [], [])
     """
-    return [item.strip() for item in re.split(r",(?![^\[]*\])", text)]
+    if not (value.startswith("[") and value.endswith("]")) or set(value) & set("'\"{}"):
+        return []
+    items, depth = [""], 0
+    for sign in value[1:-1]:
+        depth += (sign in "[(") - (sign in "])")
+        if depth < 0:
+            return []
+        if sign == "," and depth == 0:
+            items.append("")
+        else:
+            items[-1] += sign
+    found = [item.strip() for item in items]
+    return found if depth == 0 and all(re.match(r"[^\[\]()=]+=", item) for item in found) else []
 
 
 def _path_value(value: str, sweeping: bool) -> str:

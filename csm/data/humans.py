@@ -198,7 +198,7 @@ def humans_set(text: str = "original", store_root: str | None = None) -> HumansS
     """
     if text == "original":
         return HumansSet()
-    if (variation := Variation.parse(text)) is None:
+    if (variation := Variation.parse(str(text))) is None:
         raise ConfigError(f"built-in humans: {text!r} is not the name of a set; wanted original, {FORMS}")
     return VariantSet(HumansSet(), variation, store_root)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -20,7 +21,7 @@ from csm.mesh.shape import Mesh
 
 Variant: TypeAlias = Literal["refined", "remeshed", "cut", "bridged"]
 
-FORMS = "refined_N or remeshed_N with N vertices, cut_P with P percent of the area cut away, or bridged_P"
+FORMS = "refined_N or remeshed_N with N vertices, cut_P with at least P percent of the area cut away, or bridged_P"
 """How the names of variants are written, for messages."""
 
 _PERCENT = ("cut", "bridged")
@@ -34,9 +35,9 @@ class Variation:
     ----------
     variant
         "refined": finer, the original vertices first (as LPS-data does with FAUST); "remeshed": other vertices and
-        triangles altogether (as LRVD does); "cut": a part around a drawn vertex is cut away, and the largest piece of
-        the others stays; "bridged": a tube joins the places that are nearest in space among those that are far apart
-        along the surface, as where limbs of a scan touch.
+        triangles altogether (as LRVD does); "cut": a part around a drawn vertex is cut away, and of what is left the
+        largest piece stays, so that more may be gone; "bridged": a tube joins the places that are nearest in space
+        among those that are far apart along the surface, as where limbs of a scan touch.
     amount
         The number of vertices, of "refined" and "remeshed"; how many percent of the area are cut away; how long the way
         along the surface is at least that a bridge shortens, in percent of the root of the area.
@@ -70,7 +71,7 @@ class Variation:
         True
         """
         variant, _, amount = text.partition("_")
-        if variant not in get_args(Variant) or not (amount.isascii() and amount.isdigit()):
+        if variant not in get_args(Variant) or not re.fullmatch(r"0|[1-9][0-9]{0,8}", amount):
             return None
         return cls(variant, int(amount))  # type: ignore[arg-type]
 
@@ -123,7 +124,7 @@ _MAKERS: Mapping[Variant, Callable[[Mesh, int, int], Arrays]] = {
 
 def _damaged(original: Mesh, made: Damaged) -> Arrays:
     truth = np.full(original.n_vertices, -1)
-    truth[made.kept] = np.arange(len(made.kept))
+    truth[made.kept[::-1]] = np.arange(len(made.kept))[::-1]  # of a vertex that was split, the first stands for it
     return _arrays(made.mesh, truth)
 
 

@@ -11,6 +11,7 @@ from scipy.spatial.distance import cdist
 
 from csm._types import IntArray
 from csm.errors import MeshError
+from csm.mesh.mending import split
 from csm.mesh.shape import Mesh
 from csm.mesh.topology import components, edge_graph, half_edges
 
@@ -78,10 +79,12 @@ def grown_together(mesh: Mesh, far: float = 0.5) -> Damaged:
     Raises
     ------
     MeshError
-        If no two points are that far apart.
+        If no two points are that far apart, or the faces around them touch.
     """
     first, second = _contact(mesh, far * np.sqrt(mesh.area))
     a, b = mesh.faces[first], mesh.faces[second][::-1]
+    if (np.isin(mesh.faces, a).any(axis=1) & np.isin(mesh.faces, b).any(axis=1)).any():
+        raise MeshError(f"{mesh.label}: the two ends of the bridge touch; ask for parts that are farther apart")
     b = min((np.roll(b, k) for k in range(3)), key=lambda turned: _gap(mesh, a, turned))
     tube = [[(a[i], a[(i + 1) % 3], b[(i + 1) % 3]), (a[i], b[(i + 1) % 3], b[i])] for i in range(3)]
     faces = np.concatenate([np.delete(mesh.faces, [first, second], axis=0), np.reshape(tube, (6, 3))])
@@ -89,11 +92,12 @@ def grown_together(mesh: Mesh, far: float = 0.5) -> Damaged:
 
 
 def _largest_component(mesh: Mesh, faces: IntArray) -> Damaged:
-    label = components(*half_edges(faces), mesh.n_vertices)
-    areas = np.bincount(label[faces[:, 0]], Mesh(mesh.vertices, faces, mesh.name).face_areas)
-    faces = faces[label[faces[:, 0]] == areas.argmax()]
-    kept, inverse = np.unique(faces, return_inverse=True)
-    return Damaged(Mesh(mesh.vertices[kept], inverse.reshape(-1, 3), mesh.name), kept)
+    """Keep the largest piece; where faces meet in a vertex only, it has a vertex of its own for each of their fans."""
+    areas = Mesh(mesh.vertices, faces, mesh.name).face_areas
+    faces, origin = split(mesh.vertices, faces)
+    label = components(*half_edges(faces), len(origin))[faces[:, 0]]
+    kept, inverse = np.unique(faces[label == np.bincount(label, areas).argmax()], return_inverse=True)
+    return Damaged(Mesh(mesh.vertices[origin[kept]], inverse.reshape(-1, 3), mesh.name), origin[kept])
 
 
 def _contact(mesh: Mesh, far: float) -> tuple[int, int]:

@@ -112,8 +112,11 @@ def test_options_with_dashes_are_answered_with_how_they_are_written(typed, meant
 
 def test_overrides_in_a_list_are_quoted_one_by_one():
     typed = ["overrides=[trainer.max_epochs=1,data.test=[6890,10000]]", "model.channels=[1,2]", "+rows.a=['b=1']"]
+    typed += ["a=[b=[1,[2,3]],c=choice(1,2)]", "a=[b=1],[b=2]", "a=[b=1]]", "a=[b=1,]", "a=interval(0,1)"]
     assert to_overrides("matrix", typed) == [
         "overrides=['trainer.max_epochs=1','data.test=[6890,10000]']",
         "model.channels=[1,2]",
         "+rows.a=['b=1']",
+        "a=['b=[1,[2,3]]','c=choice(1,2)']",
+        *typed[4:],
     ]

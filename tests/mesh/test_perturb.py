@@ -74,3 +74,18 @@ def test_a_bridge_joins_what_is_near_in_space_and_far_on_the_surface():
 def test_a_surface_without_far_faces_is_an_error():
     with pytest.raises(MeshError, match="ask for less"):
         grown_together(sphere(2), far=50)
+
+
+def test_what_a_cut_leaves_is_a_manifold():
+    touching = Mesh(
+        np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [3, 3, 0], [3, 4, 0]], dtype=float),
+        np.array([[0, 1, 2], [0, 3, 4], [1, 5, 2], [5, 6, 2]]),
+        "two fans at 0",
+    )
+    left = without_part(touching, 6, 0.1)
+    assert sorted(left.kept.tolist()) == [0, 1, 2, 5, 6]
+
+
+def test_ends_of_a_bridge_do_not_touch():
+    with pytest.raises(MeshError, match="the two ends of the bridge touch"):
+        grown_together(sphere(0), 0.01)
