@@ -158,7 +158,7 @@ class Described:
         """What the classifier says; ConfigError if there is none."""
         if self.classifier is None:
             raise ConfigError(
-                "matching=argmax goes through the classifier of a trained network; a "
+                "matching=argmax needs a trained network with its classifier; a "
                 "descriptor has none, and an export leaves it out: use the .ckpt file"
             )
         return votes(self.features if self.classified is None else self.classified, self.classifier)

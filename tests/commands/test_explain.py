@@ -1,8 +1,8 @@
 from __future__ import annotations
 
 import errno
-import importlib.util
 import os
+from importlib.util import find_spec
 
 import pytest
 from hydra import compose, initialize_config_dir
@@ -16,7 +16,7 @@ from csm.errors import ConfigError, MeshError
 register("data", "descriptor", "model")
 
 LAUNCHERS = {"joblib": "joblib", "ray": "ray", "submitit_local": "submitit", "submitit_slurm": "submitit"}
-MISSING = [name for name, library in LAUNCHERS.items() if importlib.util.find_spec(library) is None]
+MISSING = [name for name, library in LAUNCHERS.items() if find_spec(library) is None]
 
 
 @pytest.mark.parametrize(
@@ -30,7 +30,7 @@ MISSING = [name for name, library in LAUNCHERS.items() if importlib.util.find_sp
         ("descriptor=null", "a group takes the name of one of its options"),
         *((f"hydra/launcher={name}", 'pip install "csm-correspondence[sweep]"') for name in MISSING),
         *[("hydra/launcher=ray_cluster", "hydra/launcher=ray needs an extra")] * ("ray" in MISSING),
-        ("hydra/sweeper=optuna", 'pip install "csm-correspondence[sweep]"'),
+        *[("hydra/sweeper=optuna", 'pip install "csm-correspondence[sweep]"')] * (find_spec("optuna") is None),
         ("~foo", "~foo: there is no such key to leave out"),
         ("seed==1", "'seed==1' is not of the form key=value"),
         ("seed=[1", "not of the form key=value"),

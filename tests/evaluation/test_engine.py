@@ -180,7 +180,7 @@ def test_a_preset_a_descriptor_a_method_and_lists_of_them(tmp_path, given) -> No
         ([], "nearest", "of none"),
         (CHEAP, [], "wanted one or more of nearest, argmax"),
         (3, "nearest", "got a int"),
-        (CHEAP, "argmax", "matching=argmax goes through the classifier of a trained network"),
+        (CHEAP, "argmax", "matching=argmax needs a trained network with its classifier"),
     ],
 )
 def test_what_is_no_method_or_matcher_is_an_error_of_the_user(tmp_path, method, matching, said) -> None:

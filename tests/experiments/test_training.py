@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 from hydra.utils import instantiate
-from lightning.pytorch.callbacks import TQDMProgressBar
+from lightning.pytorch.callbacks import ProgressBar
 from lightning.pytorch.loggers import CSVLogger
 from omegaconf import OmegaConf
 
@@ -159,7 +159,7 @@ def test_a_bar_is_for_terminals(tmp_path, monkeypatch, terminal, wanted, bar):
     monkeypatch.setattr(sys.stdout, "isatty", lambda: bool(terminal))
     trainer = partial(L.Trainer, **(QUICK | {"enable_progress_bar": bool(wanted)}))
     made = module.make_trainer(a_training(tmp_path, trainer=trainer), tmp_path)
-    assert isinstance(made.progress_bar_callback, TQDMProgressBar) == bool(bar)
+    assert isinstance(made.progress_bar_callback, ProgressBar) == bool(bar)
 
 
 def test_a_module_is_made_for_the_shapes_of_the_data(tmp_path):

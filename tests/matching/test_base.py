@@ -63,7 +63,7 @@ def test_a_shape_votes_once_and_only_with_a_classifier() -> None:
     descriptor, _, classifier = problem()
     described = Described(sphere(1), descriptor, classifier)
     assert described.votes is described.votes
-    with pytest.raises(ConfigError, match=r"matching=argmax goes through the classifier .* use the \.ckpt file"):
+    with pytest.raises(ConfigError, match=r"matching=argmax needs a trained network .* use the \.ckpt file"):
         _ = Described(sphere(1), descriptor).votes
 
 
