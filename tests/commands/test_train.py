@@ -39,7 +39,8 @@ def test_an_error_comes_before_the_training(tmp_path, monkeypatch, capsys, argum
 
 def test_a_sweeper_is_told_the_number_that_it_makes_small(tmp_path, monkeypatch):
     bench = Bench(tmp_path, monkeypatch)
-    bench.run("train", *TOYS, "objective=val/age", "data.holdout=2", "test=false", "hydra.run.dir=run")
+    short = ["trainer.max_epochs=4", "trainer.check_val_every_n_epoch=4", "data.holdout=2", "test=false"]
+    bench.run("train", *TOYS, *short, "objective=val/age", "hydra.run.dir=run")
     record = json.loads((tmp_path / "run/result.json").read_text())
     assert record["objective"] == record["val/age"] > 0
 
@@ -55,7 +56,7 @@ def test_optuna_tries_settings_and_keeps_the_best(tmp_path, monkeypatch):
     pytest.importorskip("optuna", reason='Optuna is not installed: pip install "csm-correspondence[sweep]"')
     bench = Bench(tmp_path, monkeypatch)
     small = [*TOYS, "descriptor=acd_paper", "learning.places=0", "data.holdout=2"]
-    small += ["trainer.max_epochs=2", "trainer.check_val_every_n_epoch=1"]
+    small += ["trainer.max_epochs=1", "trainer.check_val_every_n_epoch=1"]
     small.remove("model.dropout=0")
     bench.run("train", "experiment=tune", *small, "hydra.sweeper.n_trials=2", "hydra.sweep.dir=sweep", "-m")
     best = yaml.safe_load((tmp_path / "sweep/optimization_results.yaml").read_text())
