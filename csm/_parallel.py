@@ -85,8 +85,9 @@ def parallel_map(
     Raises
     ------
     ConfigError
-        If a process dies, for instance because memory runs out; names its task.
+        If `workers` is no number of processes, or one dies, for instance because memory runs out; names its task.
     """
+    workers = None if workers is None else n_processes(workers, 1)
     n = len(tasks) if isinstance(tasks, Sized) else total
     results: dict[int, R] = {}
     with progress_bar(total=n, desc=what, unit=unit, disable=not progress) as bar:

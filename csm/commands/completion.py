@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from csm.commands.choices import BENCHES, options_of
-from csm.commands.help import SETTINGS, Page, read_page, settings_of
+from csm.commands.choices import options_of
+from csm.commands.help import SETTINGS, Page, read_page, settings_of, studies_of
 from csm.commands.main import COMMANDS, COMPLETION
-from csm.commands.words import PATHS, WORDS
+from csm.commands.words import PATHS
 
 _BASH = """\
 _csm() {
@@ -93,7 +93,7 @@ def candidates(line: str) -> list[str]:
         return []
     key, equals, _ = word.partition("=")
     page = read_page(before[0])
-    found = _values(key, page) if equals else [*_studies(before[0]), *(f"{name}=" for name in _keys(before[0], page))]
+    found = _values(key, page) if equals else [*studies_of(before[0]), *(f"{name}=" for name in _keys(before[0], page))]
     return [candidate for candidate in found if candidate.startswith(word)]
 
 
@@ -140,12 +140,3 @@ def _shipped() -> list[str]:
 
 _NAMES: Mapping[str, Callable[[], list[str]]] = {"matching": _matchers, "refine": _refiners, "model": _shipped}
 """Keys, which are no groups, -> the names that they take."""
-
-
-def _studies(command: str) -> list[str]:
-    """Return the words that a command takes without a key, where they are names."""
-    if "targets" not in WORDS.get(command, ()):
-        return []
-    from csm.reproduction.registry import STUDIES
-
-    return list(BENCHES if command == "bench" else STUDIES)

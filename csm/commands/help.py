@@ -93,7 +93,8 @@ def help_text(command: str, arguments: Sequence[str] = ()) -> str:
     words = " ".join(f"[{key.upper()} ...]" if key in LISTS else key.upper() for key in WORDS.get(command, ()))
     lines = [f"usage: csm {command} {words} [key=value ...]".replace("  ", " "), ""]
     lines += [*textwrap.wrap(" ".join(page.purpose), _WIDTH), ""]
-    studies = _studies(command, arguments)
+    named = studies_of(command)
+    studies = [named[word] for word in arguments if word in named]
     if command == "reproduce" and not studies:
         lines += ["studies, each with options of its own (csm reproduce table1 --help):", listing(), ""]
     for study in studies:
@@ -123,10 +124,15 @@ def help_text(command: str, arguments: Sequence[str] = ()) -> str:
     return "\n".join(lines)
 
 
-def _studies(command: str, arguments: Sequence[str]) -> list[str]:
-    """Return the studies that are named among the arguments of a command that makes some."""
-    named = BENCHES if command == "bench" else {name: name for name in STUDIES} if command == "reproduce" else {}
-    return [named[word] for word in arguments if word in named]
+def studies_of(command: str) -> dict[str, str]:
+    """Return word -> study of the words that a command takes for studies; nothing for most commands.
+
+    Examples
+    --------
+    >>> studies_of("bench")["descriptors"], studies_of("match")
+    ('table2', {})
+    """
+    return dict(BENCHES) if command == "bench" else {name: name for name in STUDIES} if command == "reproduce" else {}
 
 
 def _shown(value: object) -> str:

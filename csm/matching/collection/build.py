@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import shortest_path
 
-from csm._parallel import n_processes, parallel_map
+from csm._parallel import parallel_map
 from csm._types import Float32Array, FloatArray, IntArray
 from csm.data.store import Store
 from csm.descriptors.base import Descriptor
@@ -128,8 +128,7 @@ class _Run:
     progress: bool
 
     def __call__(self, function: Any, tasks: Sequence[Any], label: Any, what: str, unit: str) -> list[Any]:
-        n = None if self.workers is None else n_processes(self.workers, len(tasks))
-        return parallel_map(function, tasks, label, n, what=what, unit=unit, progress=self.progress)
+        return parallel_map(function, tasks, label, self.workers, what=what, unit=unit, progress=self.progress)
 
 
 @dataclass(frozen=True, eq=False)

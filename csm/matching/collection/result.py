@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from csm._counts import counted
-from csm._parallel import n_processes, parallel_map
+from csm._parallel import parallel_map
 from csm._places import load
 from csm._types import FloatArray, IntArray
 from csm.errors import ConfigError
@@ -193,8 +193,7 @@ class MatchedCollection:
         found = {pair: self._kept[pair] for pair in both if pair in self._kept}
         missing = [pair for pair in both if pair not in found]
         tasks = [self._task(*pair) for pair in missing]
-        n = None if workers is None else n_processes(workers, len(tasks))
-        n = n if self.members[0].device == "cpu" else 0
+        n = workers if self.members[0].device == "cpu" else 0
         done = parallel_map(both_maps, tasks, EdgeTask.label_of, n, what="map", unit="pair", progress=progress)
         found |= zip(missing, done, strict=True)
         self._kept.update({pair: maps for pair, maps in found.items() if self.reference_index in pair})
