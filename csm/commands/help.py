@@ -25,6 +25,7 @@ SETTINGS = {
         "data.holdout=10": "validate on this many training shapes, the last ones, which are then not fitted",
         "data.also=[remeshed_5000]": "more training shapes: other triangles, cut_30 (percent), bodies.npz, or humans",
         "data.test=[remeshed_5000]": "sets to test on, by their names; data.test_roots=[FOLDER] with data=folder",
+        "data.test_forms=[uneven_8000]": "also test on the first of these sets with other triangles",
         "data.basis_k=128": "eigenpairs that are kept of each shape",
         "trainer.max_epochs=50": "how often all training shapes are gone through",
         "trainer.max_time=00:01:00:00": "days:hours:minutes:seconds after which it ends, whatever the epoch",

@@ -10,7 +10,7 @@ from csm._places import load
 from csm.data.registry import data_set, find_set
 from csm.data.shapes import ShapeSet
 from csm.data.store import Store
-from csm.data.variants import FORMS, VariantSet, Variation
+from csm.data.variants import FORMS, Variation, in_form
 from csm.errors import ConfigError, DataError
 
 _PUBLISHED = ("faust", "scape")
@@ -77,13 +77,15 @@ def additional(text: str, train_set: ShapeSet, names: Sequence[str], store: Stor
         file, other = text, ""
     if file.endswith(".npz"):
         bodies = load("csm.data.bodies.archive:Bodies")(file)
-        return Additional(_in_form(bodies, other, store), bodies.names, template, bodies.digest)
+        shapes = in_form(bodies, other, store, "data.also") if other else bodies
+        return Additional(shapes, bodies.names, template, bodies.digest)
     if text == "humans" or (text.startswith("humans_") and Variation.parse(text.removeprefix("humans_"))):
         humans = load("csm.data.humans:HumansSet")()
-        shapes = _in_form(humans, text.removeprefix("humans").removeprefix("_"), store)
+        form = text.removeprefix("humans").removeprefix("_")
+        shapes = in_form(humans, form, store, "data.also") if form else humans
         return Additional(shapes, load("csm.data.humans:SPLITS")[0].train, template)
     if Variation.parse(text):
-        return Additional(_in_form(train_set, text, store), tuple(names))
+        return Additional(in_form(train_set, text, store, "data.also"), tuple(names))
     for name in _PUBLISHED:
         if text.startswith(f"{name.upper()}_"):
             if train_set.name.upper().startswith(name.upper()):
@@ -108,9 +110,3 @@ def _found(name: str, train_set: ShapeSet) -> ShapeSet:
         with suppress(DataError):
             return find_set(root.parent, name)
     return find_set(None, name)
-
-
-def _in_form(shapes: ShapeSet, text: str, store: Store) -> ShapeSet:
-    """Return the shapes in the form that a text such as "remeshed_5000" names, or as they are without a text."""
-    variation = Variation.parse(text)
-    return shapes if variation is None else VariantSet(shapes, variation, str(store.root))

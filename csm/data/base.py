@@ -17,6 +17,7 @@ from csm.data.prepare import Job, Prepared, Recipe, is_prepared, prepare, prepar
 from csm.data.shapes import InMemory, Shape, ShapeSet
 from csm.data.splits import Split
 from csm.data.store import Store
+from csm.data.variants import in_form
 from csm.descriptors.base import Descriptor
 from csm.errors import CsmError, DataError
 from csm.operators.stencils import Stencil
@@ -50,6 +51,9 @@ class DataModule:
     also
         Names of additional training shapes, see `csm.data.additional`: "remeshed_5000" are the fitted shapes with other
         triangles, "humans" the built-in ones, which have a template, and in training a classifier, of their own.
+    test_forms
+        Forms of the first test set, see `csm.data.variants`, to test on as well: "refined_12500", "remeshed_5000",
+        "uneven_8000", "slivers_30", "cut_30" and so on.
 
     Raises
     ------
@@ -72,13 +76,15 @@ class DataModule:
         workers: int | None = None,
         stencils: Sequence[Stencil] = (),
         also: Sequence[str] = (),
+        test_forms: Sequence[str] = (),
     ) -> None:
         n_processes(workers, 0)  # what is no number is refused before anything is read
         self.train_set, *tests = distinct([train_set, *test_sets])
         self.split, self.holdout, self.workers = split, holdout, workers
-        self.test_sets: Mapping[str, ShapeSet] = _by_name(tests)
         self.recipe = Recipe(descriptor, basis_k, tuple(stencils))
         self.store = store or Store()
+        tests += [in_form(tests[0], form, self.store, "data.test_forms") for form in test_forms]
+        self.test_sets: Mapping[str, ShapeSet] = _by_name(tests)
         self.fit_names, held_out = split.held_out(holdout)
         self.validation_names = held_out or split.validation or split.train[-10:]
         self.also = tuple(additional(text, self.train_set, self.fit_names, self.store) for text in also)

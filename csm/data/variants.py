@@ -15,16 +15,25 @@ from csm.data.shapes import Shape, ShapeSet
 from csm.data.store import Store
 from csm.errors import ConfigError
 from csm.mesh.correspondence import Direction, PointMap
-from csm.mesh.perturb import Damaged, grown_together, without_part
+from csm.mesh.perturb import Damaged, grown_together, with_slivers, without_part
 from csm.mesh.remesh import refine, remesh
 from csm.mesh.shape import Mesh
 
-Variant: TypeAlias = Literal["refined", "remeshed", "cut", "bridged"]
+Variant: TypeAlias = Literal["refined", "remeshed", "uneven", "slivers", "cut", "bridged"]
 
-FORMS = "refined_N or remeshed_N with N vertices, cut_P with at least P percent of the area cut away, or bridged_P"
+FORMS = (
+    "refined_N, remeshed_N or uneven_N with N vertices, slivers_P with P percent more vertices, cut_P with at least P "
+    "percent of the area cut away, or bridged_P"
+)
 """How the names of variants are written, for messages."""
 
-_PERCENT = ("cut", "bridged")
+_PERCENT = ("slivers", "cut", "bridged")
+
+_BY_NAME = ("uneven", "cut")
+"""Forms whose draws differ between the shapes of one set."""
+
+_CONTRAST = 4.0
+"""How many times longer the edges of "uneven" are at one end of the shape than at the other."""
 
 
 @dataclass(frozen=True)
@@ -35,12 +44,15 @@ class Variation:
     ----------
     variant
         "refined": finer, the original vertices first (as LPS-data does with FAUST); "remeshed": other vertices and
-        triangles altogether (as LRVD does); "cut": a part around a drawn vertex is cut away, and of what is left the
-        largest piece stays, so that more may be gone; "bridged": a tube joins the places that are nearest in space
-        among those that are far apart along the surface, as where limbs of a scan touch.
+        triangles altogether (as LRVD does); "uneven": the same, with edges four times as long at one end of the shape
+        as at the other, along a drawn direction; "slivers": the original vertices first, and new ones that split drawn
+        edges close to an end, which makes thin triangles; "cut": a part around a drawn vertex is cut away, and of what
+        is left the largest piece stays, so that more may be gone; "bridged": a tube joins the places that are nearest
+        in space among those that are far apart along the surface, as where limbs of a scan touch.
     amount
-        The number of vertices, of "refined" and "remeshed"; how many percent of the area are cut away; how long the way
-        along the surface is at least that a bridge shortens, in percent of the root of the area.
+        The number of vertices, of "refined", "remeshed" and "uneven"; how many percent more vertices "slivers" has; how
+        many percent of the area are cut away; how long the way along the surface is at least that a bridge shortens, in
+        percent of the root of the area.
     seed
         Of the draws.
     """
@@ -81,15 +93,15 @@ class Variation:
     def of(self, original: Mesh, store: Store) -> Arrays:
         """Return vertices, faces and truth (the vertex of every original one, -1 where it is gone) of the changed mesh.
 
-        It is computed once and kept in the store.  What is cut away depends on the name of the mesh, so that shapes of
-        one set lose different parts.
+        It is computed once and kept in the store.  What is cut away, and where a mesh is uneven, depends on the name of
+        the mesh, so that shapes of one set lose different parts.
 
         Raises
         ------
         csm.errors.MeshError
             If the mesh cannot be changed so.
         """
-        seed = self.seed + (zlib.crc32(original.name.encode()) if self.variant == "cut" else 0)
+        seed = self.seed + (zlib.crc32(original.name.encode()) if self.variant in _BY_NAME else 0)
         amount = {"percent" if self.variant in _PERCENT else "n_vertices": self.amount}
         params = {"variant": self.variant, **amount, "seed": seed}
         return store.fetch("remesh", original, params, lambda: _MAKERS[self.variant](original, self.amount, seed))
@@ -105,6 +117,15 @@ def _remeshed(original: Mesh, n_vertices: int, seed: int) -> Arrays:
     return _arrays(made.mesh, made.truth.indices)
 
 
+def _uneven(original: Mesh, n_vertices: int, seed: int) -> Arrays:
+    made = remesh(original, n_vertices, seed, _CONTRAST)
+    return _arrays(made.mesh, made.truth.indices)
+
+
+def _slivers(original: Mesh, percent: int, seed: int) -> Arrays:
+    return _damaged(original, with_slivers(original, percent / 100, seed))
+
+
 def _cut(original: Mesh, percent: int, seed: int) -> Arrays:
     centre = int(np.random.default_rng(seed).integers(original.n_vertices))
     return _damaged(original, without_part(original, centre, percent / 100))
@@ -117,14 +138,16 @@ def _bridged(original: Mesh, percent: int, seed: int) -> Arrays:
 _MAKERS: Mapping[Variant, Callable[[Mesh, int, int], Arrays]] = {
     "refined": _refined,
     "remeshed": _remeshed,
+    "uneven": _uneven,
+    "slivers": _slivers,
     "cut": _cut,
     "bridged": _bridged,
 }
 
 
 def _damaged(original: Mesh, made: Damaged) -> Arrays:
-    truth = np.full(original.n_vertices, -1)
-    truth[made.kept[::-1]] = np.arange(len(made.kept))[::-1]  # of a vertex that was split, the first stands for it
+    truth, old = np.full(original.n_vertices, -1), np.flatnonzero(made.kept >= 0)
+    truth[made.kept[old[::-1]]] = old[::-1]  # of a vertex that was split, the first stands for it
     return _arrays(made.mesh, truth)
 
 
@@ -178,3 +201,27 @@ class VariantSet:
 
         mirror = None if original.mirror is None else carried(original.mirror)
         return replace(original, mesh=mesh, truth=carried(original.truth), mirror=mirror)
+
+
+def in_form(shapes: ShapeSet, text: str, store: Store, option: str) -> VariantSet:
+    """Return the shapes of a set in the form that a text such as "remeshed_5000" names.
+
+    Parameters
+    ----------
+    shapes
+        The set.
+    text
+        What `Variation.parse` reads.
+    store
+        Where the form is kept.
+    option
+        Which option the text was given to, for the message.
+
+    Raises
+    ------
+    ConfigError
+        If the text has another form.
+    """
+    if (variation := Variation.parse(str(text))) is None:
+        raise ConfigError(f"{option}: {text!r} is no form of a set; wanted {FORMS}")
+    return VariantSet(shapes, variation, str(store.root))

@@ -1,4 +1,4 @@
-"""Synthetic damage of a mesh: noise, missing parts, and topological noise, a bridge between two near parts."""
+"""Synthetic damage of a mesh: noise, slivers, missing parts, and topological noise, a bridge between near parts."""
 
 from __future__ import annotations
 
@@ -12,13 +12,15 @@ from scipy.spatial.distance import cdist
 from csm._types import IntArray
 from csm.errors import MeshError
 from csm.mesh.mending import split
+from csm.mesh.remesh.edge_moves import edge_table, independent
+from csm.mesh.remesh.edge_moves import split as split_edges
 from csm.mesh.shape import Mesh
 from csm.mesh.topology import components, edge_graph, half_edges
 
 
 @dataclass(frozen=True, eq=False)
 class Damaged:
-    """A damaged mesh, and for each of its vertices the number that it has on the original, shape (N',)."""
+    """A damaged mesh, and for each of its vertices the number that it has on the original, -1 for none, shape (N',)."""
 
     mesh: Mesh
     kept: IntArray
@@ -38,6 +40,41 @@ def with_noise(mesh: Mesh, strength: float, seed: int = 0) -> Damaged:
     shift = np.random.default_rng(seed).standard_normal(mesh.vertices.shape)
     moved = mesh.vertices + strength * lengths.mean() * shift
     return Damaged(Mesh(moved, mesh.faces, mesh.name), np.arange(mesh.n_vertices))
+
+
+def with_slivers(mesh: Mesh, share: float, seed: int = 0) -> Damaged:
+    """Split drawn edges close to one of their ends, which makes thin triangles and leaves the surface as it is.
+
+    Parameters
+    ----------
+    mesh
+        A manifold, oriented mesh.
+    share
+        How many vertices are added, as a share of those that are there; they come last, each 2 to 10 % of its edge
+        from one of the ends.
+    seed
+        Of the draw.
+
+    Examples
+    --------
+    >>> square = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    >>> thin = with_slivers(square, 0.25)
+    >>> thin.mesh.n_vertices, thin.kept.tolist(), float(thin.mesh.area)
+    (5, [0, 1, 2, 3, -1], 1.0)
+    """
+    rng = np.random.default_rng(seed)
+    vertices, faces = mesh.vertices, mesh.faces
+    wanted = mesh.n_vertices + round(share * mesh.n_vertices)
+    while len(vertices) < wanted:
+        table = edge_table(faces)
+        edges = independent(table, np.arange(len(table.ends)), rng.random(len(table.ends)), len(faces))
+        edges = edges[: wanted - len(vertices)]
+        near, far = rng.permuted(table.ends[edges], axis=1).T
+        t = rng.uniform(0.02, 0.1, (len(edges), 1))
+        faces = split_edges(faces, table, edges, len(vertices))
+        vertices = np.concatenate([vertices, (1 - t) * vertices[near] + t * vertices[far]])
+    kept = np.concatenate([np.arange(mesh.n_vertices), np.full(len(vertices) - mesh.n_vertices, -1)])
+    return Damaged(Mesh(vertices, faces, mesh.name), kept)
 
 
 def without_part(mesh: Mesh, centre: int, fraction: float) -> Damaged:

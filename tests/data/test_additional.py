@@ -31,7 +31,7 @@ def test_the_same_shapes_share_a_template_and_humans_have_their_own(toys, tmp_pa
 
 @pytest.mark.parametrize("text", ["faust", "remeshed", "remeshed_x", "humans_5000", "", "humans_bent_3"])
 def test_an_unknown_name_is_answered_with_the_forms(toys, tmp_path, text):
-    with pytest.raises(ConfigError, match=r"data.also: .* wanted a FORM \(refined_N or remeshed_N"):
+    with pytest.raises(ConfigError, match=r"data.also: .* wanted a FORM \(refined_N, remeshed_N or uneven_N"):
         additional(text, toys, SPLIT.train, Store(tmp_path))
 
 

@@ -13,7 +13,7 @@ from csm.data.shapes import InMemory, Shape
 from csm.data.splits import Split
 from csm.data.store import Store
 from csm.descriptors import HKS
-from csm.errors import DataError
+from csm.errors import ConfigError, DataError
 from csm.mesh.correspondence import PointMap
 from csm.mesh.io import write_mesh
 from csm.mesh.shape import Mesh
@@ -121,6 +121,18 @@ def test_shapes_that_are_fitted_in_another_form_are_not_unseen(toys, tmp_path):
     data = module(toys, tmp_path, split, also=["humans"])
     assert not data.validates_unseen
     assert data.watched.endswith("also fitted")
+
+
+def test_tests_in_other_forms_come_beside_the_sets(toys, tmp_path):
+    data = module(toys, tmp_path, test_forms=["slivers_20", "refined_200"])
+    assert list(data.test_sets) == ["toys", "toys_slivers_20", "toys_refined_200"]
+    finer = data.test_sets["toys_refined_200"]
+    assert data.test_names(finer) == data.test_names(toys)
+    assert finer.load("toy4").mesh.n_vertices == 200
+    with pytest.raises(ConfigError, match=r"data.test_forms: 'bent_3' is no form of a set; wanted refined_N"):
+        module(toys, tmp_path, test_forms=["bent_3"])
+    with pytest.raises(DataError, match="only 2 different names"):
+        module(toys, tmp_path, test_forms=["slivers_20", "slivers_20"])
 
 
 def test_a_shape_that_the_split_names_and_the_set_lacks_is_reported(toys, tmp_path):

@@ -120,7 +120,9 @@ def test_a_variant_is_computed_once(store: str, monkeypatch: pytest.MonkeyPatch)
 
 @pytest.mark.parametrize("text", ["", "originals", "original_5", "refined", "refined_many", "remeshed_-3"])
 def test_other_names_are_refused(text: str) -> None:
-    with pytest.raises(ConfigError, match="wanted original, refined_N or remeshed_N with N vertices, cut_P"):
+    with pytest.raises(
+        ConfigError, match="wanted original, refined_N, remeshed_N or uneven_N with N vertices, slivers_P"
+    ):
         humans_set(text)
 
 

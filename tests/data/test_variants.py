@@ -12,17 +12,31 @@ from tests.shapes import blob, sphere
 from tests.toyset import write_toys
 
 
-@pytest.mark.parametrize("variation", [Variation("refined", 900), Variation("remeshed", 300)])
-def test_each_vertex_of_the_original_has_a_place_and_it_is_computed_once(tmp_path, variation):
-    mesh, store = blob(3), Store(tmp_path)
+@pytest.mark.parametrize("text", ["refined_900", "remeshed_300", "uneven_400", "slivers_20"])
+def test_each_vertex_of_the_original_has_a_place_and_it_is_computed_once(tmp_path, text):
+    mesh, store, variation = blob(3), Store(tmp_path), Variation.parse(text)
     made = variation.of(mesh, store)
     assert made["truth"].shape == (mesh.n_vertices,)
-    assert 0.7 < len(made["vertices"]) / variation.amount < 1.3
+    wanted = 1.2 * mesh.n_vertices if variation.variant == "slivers" else variation.amount
+    assert 0.99 < len(made["vertices"]) / wanted < 1.01
     moved = np.linalg.norm(made["vertices"][made["truth"]] - mesh.vertices, axis=1)
     assert moved.max() < 0.4
     before = store.computed
     np.testing.assert_array_equal(variation.of(mesh, store)["faces"], made["faces"])
     assert store.computed == before
+
+
+def test_uneven_meshes_are_dense_at_one_end_which_differs_between_shapes(tmp_path):
+    store, directions = Store(tmp_path), []
+    for name in ("a", "b"):
+        made = Variation("uneven", 1500).of(Mesh(sphere(4).vertices, sphere(4).faces, name), store)
+        mesh = Mesh(made["vertices"], made["faces"], name)
+        middles = mesh.corners.mean(axis=1)
+        slope, *_ = np.linalg.lstsq(np.c_[middles, np.ones(mesh.n_faces)], np.log(mesh.face_areas), rcond=None)
+        directions.append(slope[:3] / np.linalg.norm(slope[:3]))
+        height = middles @ directions[-1]
+        assert mesh.face_areas[height > 0.7].mean() > 5 * mesh.face_areas[height < -0.7].mean()
+    assert abs(directions[0] @ directions[1]) < 0.99
 
 
 def test_a_cut_takes_its_share_of_the_area_and_says_what_is_gone(tmp_path):

@@ -5,7 +5,8 @@ import pytest
 import trimesh
 
 from csm.errors import MeshError
-from csm.mesh.perturb import grown_together, with_noise, without_part
+from csm.mesh.check import check
+from csm.mesh.perturb import grown_together, with_noise, with_slivers, without_part
 from csm.mesh.shape import Mesh
 from tests.shapes import sphere, torus
 
@@ -31,6 +32,22 @@ def test_noise_is_in_units_of_the_mean_edge():
     np.testing.assert_array_equal(moved.mesh.faces, mesh.faces)
     np.testing.assert_array_equal(with_noise(mesh, 0.3, seed=1).mesh.vertices, moved.mesh.vertices)
     np.testing.assert_array_equal(with_noise(mesh, 0.0).mesh.vertices, mesh.vertices)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.2, 0.9])
+def test_slivers_keep_the_surface_and_its_vertices_and_are_thin(share):
+    mesh = sphere(4)
+    made = with_slivers(mesh, share, seed=3)
+    count = round(share * mesh.n_vertices)
+    assert made.mesh.n_vertices == mesh.n_vertices + count
+    np.testing.assert_array_equal(made.mesh.vertices[: mesh.n_vertices], mesh.vertices)
+    assert made.kept.tolist() == [*range(mesh.n_vertices), *[-1] * count]
+    assert made.mesh.area == pytest.approx(mesh.area, rel=1e-12)
+    assert {finding.kind for finding in check(made.mesh)} == set()
+    lengths = np.linalg.norm(np.diff(made.mesh.corners[:, [0, 1, 2, 0]], axis=1), axis=2)
+    thin = (lengths.min(axis=1) < 0.12 * lengths.max(axis=1)).sum()
+    assert count <= thin <= 2 * count, "each new vertex makes one or two thin faces"
+    np.testing.assert_array_equal(with_slivers(mesh, share, seed=3).mesh.faces, made.mesh.faces)
 
 
 @pytest.mark.parametrize("fraction", [0.1, 0.4])

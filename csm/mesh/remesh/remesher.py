@@ -102,7 +102,7 @@ def refine(mesh: Mesh, n_vertices: int, seed: int = 0) -> Remeshed:
     return Remeshed(finer, truth, location[: mesh.n_vertices])
 
 
-def remesh(mesh: Mesh, n_vertices: int, seed: int = 0) -> Remeshed:
+def remesh(mesh: Mesh, n_vertices: int, seed: int = 0, contrast: float = 1.0) -> Remeshed:
     """Return an independent triangulation of the surface of `mesh` with other vertices, in random order.
 
     Edges are split, collapsed and flipped and vertices moved along the surface until edges have the wanted length
@@ -118,6 +118,9 @@ def remesh(mesh: Mesh, n_vertices: int, seed: int = 0) -> Remeshed:
         Number of vertices of the result.
     seed
         Seed of the random choices; the same seed gives the same mesh.
+    contrast
+        How many times longer edges are at one end of the shape than at the other, along a drawn direction, beside what
+        they follow of `mesh`: with 4 the vertices are up to 16 times as dense.
 
     Raises
     ------
@@ -127,6 +130,8 @@ def remesh(mesh: Mesh, n_vertices: int, seed: int = 0) -> Remeshed:
     _require_fit(mesh)
     rng = np.random.default_rng(seed)
     sizes = _graded_sizes(mesh)
+    if contrast != 1:
+        sizes = sizes * contrast ** _along(mesh, rng.standard_normal(3))
     area_factor = np.sqrt(2 / np.sqrt(3) * (mesh.face_areas / sizes[mesh.faces].mean(axis=1) ** 2).sum() / n_vertices)
     editable = EditableMesh(mesh, sizes * area_factor, 0, rng)
     editable.scatter(0.3)
@@ -188,6 +193,13 @@ def _graded_sizes(mesh: Mesh) -> FloatArray:
     for _ in range(3):
         size = (size + link @ size) / (1 + degree)
     return size**GRADING
+
+
+def _along(mesh: Mesh, direction: FloatArray) -> FloatArray:
+    """Return how far each vertex lies along a direction, from 0 at one end of the shape to 1 at the other, (N,)."""
+    height = mesh.vertices @ direction
+    share: FloatArray = (height - height.min()) / np.ptp(height)
+    return share
 
 
 def _require_fit(mesh: Mesh) -> None:
