@@ -22,12 +22,16 @@ from csm.mesh.io import atomic_path
 Run = Callable[[], object]
 
 
-def options(name: str, about: str | None, variants: Sequence[str], repeats: int) -> argparse.Namespace:
+def options(
+    name: str, about: str | None, variants: Sequence[str], repeats: int, sizes: Sequence[int] = ()
+) -> argparse.Namespace:
     """Read the command line and set PyTorch's threads."""
     parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--threads", type=int, default=torch.get_num_threads(), help="of PyTorch")
     parser.add_argument("--repeats", type=int, default=repeats, help="passes per variant")
     parser.add_argument("--out", type=Path, default=Path(f"results/benchmark_{name}.json"))
+    if sizes:
+        parser.add_argument("--sizes", type=int, nargs="+", default=list(sizes), help="numbers of vertices")
     parser.add_argument("--peak-of", choices=variants, help=argparse.SUPPRESS)
     chosen = parser.parse_args()
     torch.set_num_threads(chosen.threads)
@@ -63,7 +67,7 @@ def growth_megabytes(run: Run) -> float:
     return (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / unit
 
 
-def write(name: str, chosen: argparse.Namespace, size: Mapping[str, int], rows: Sequence[Any]) -> None:
+def write(name: str, chosen: argparse.Namespace, size: Mapping[str, float], rows: Sequence[Any]) -> None:
     """Write the rows with the size of the problem, the command and the versions."""
     command = f"python benchmarks/{name}.py --threads {chosen.threads} --repeats {chosen.repeats}"
     made = asdict(replace(provenance(), command=command))

@@ -1,0 +1,108 @@
+"""Bases and ACD of big meshes: seconds and peak memory over the number of vertices, with the exponents of their growth.
+
+    python benchmarks/scale.py --threads 2 --sizes 30000 100000 300000 1000000
+
+The meshes are a built-in human, remeshed and then subdivided.  Each size runs in a process of its own, so that the peak
+is that of the whole process.  The work is what the paper's network needs of a shape: `acd_paper` and 128 functions of
+the isotropic Laplacian; the Laplacians and frames are a part of it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import trimesh
+from measuring import options, write
+
+from csm import Mesh, Operators, load_humans, preset
+from csm.mesh.remesh import remesh
+
+SIZES = (30_000, 100_000, 300_000, 1_000_000)
+_COARSE = 16_000
+
+
+@dataclass(frozen=True)
+class Row:
+    """What was measured of one mesh: seconds of the descriptor, of the functions, and the peak of the process."""
+
+    vertices: int
+    acd_paper_s: float
+    functions_s: float
+    seconds: float
+    megabytes: float
+
+
+def body(n_vertices: int) -> Mesh:
+    """Return a human with about so many vertices; each subdivision makes four of one."""
+    times = 0
+    while n_vertices > _COARSE * 4**times:
+        times += 1
+    mesh = remesh(load_humans()[0], n_vertices // 4**times)
+    vertices, faces = mesh.mesh.vertices, mesh.mesh.faces
+    for _ in range(times):
+        vertices, faces = trimesh.remesh.subdivide(vertices, faces)
+    return Mesh(vertices, faces, f"human of {len(vertices)}")
+
+
+def measured(file: Path) -> Row:
+    """Measure the mesh of a file in this process."""
+    with np.load(file) as arrays:
+        mesh = Mesh(arrays["vertices"], arrays["faces"], file.stem)
+    begun = time.perf_counter()
+    operators = Operators(mesh)
+    preset("acd_paper")(operators)
+    between = time.perf_counter()
+    operators.lbo(128)
+    done = time.perf_counter()
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
+    return Row(mesh.n_vertices, between - begun, done - between, done - begun, peak)
+
+
+def in_a_process(n_vertices: int, threads: int, folder: Path) -> Row:
+    """Make a mesh and measure it in a fresh process."""
+    mesh, file = body(n_vertices), folder / f"{n_vertices}.npz"
+    np.savez(file, vertices=mesh.vertices, faces=mesh.faces)
+    limits = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), str(threads))
+    line = [sys.executable, __file__, "--of", str(file)]
+    done = subprocess.run(line, check=True, stdout=subprocess.PIPE, text=True, env=os.environ | limits)
+    return Row(**json.loads(done.stdout.splitlines()[-1]))
+
+
+def exponent(rows: list[Row], value: str) -> float:
+    """Return the power of the number of vertices that a column grows with, by least squares of the logarithms."""
+    n, y = (np.log([getattr(row, name) for row in rows]) for name in ("vertices", value))
+    return float(np.polyfit(n, y, 1)[0])
+
+
+def main() -> None:
+    chosen = options("scale", __doc__, [], repeats=1, sizes=SIZES)
+    rows = []
+    with TemporaryDirectory() as folder:
+        for n in chosen.sizes:
+            rows.append(row := in_a_process(n, chosen.threads, Path(folder)))
+            print(
+                f"{row.vertices:>9,} vertices  acd_paper {row.acd_paper_s:7.1f} s  128 functions "
+                f"{row.functions_s:7.1f} s  together {row.seconds:7.1f} s  peak {row.megabytes:6.0f} MB",
+                flush=True,
+            )
+    found = (
+        {f"exponent_of_{value}": exponent(rows, value) for value in ("seconds", "megabytes")} if len(rows) > 1 else {}
+    )
+    print(found)
+    write("scale", chosen, found, rows)
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["--of"]:
+        print(json.dumps(asdict(measured(Path(sys.argv[2])))))
+    else:
+        main()
