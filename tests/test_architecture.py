@@ -64,6 +64,8 @@ TESTED_ELSEWHERE = {
     "commands.main": "test_cli.py",
     "commands.match": "commands/test_pipeline.py",
     "commands.matrix": "commands/test_pipeline.py",
+    "commands.tested": "commands/test_pipeline.py",
+    "commands.train": "commands/test_training.py",
     "errors": "mesh/io/test_files.py",
     "mesh.io.raw": "mesh/io/test_off.py",
 }

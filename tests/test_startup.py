@@ -18,17 +18,19 @@ HEAVY = {"lightning", "tensorboard", "matplotlib", "h5py", "pandas"}
 SAYING_WHAT_IS_LOADED = (
     "import json, sys\n"
     "from csm.commands.main import main\n"
-    "main()\n"
-    "print(json.dumps([name for name in sys.modules if '.' not in name]))"
+    "try:\n"
+    "    main()\n"
+    "finally:\n"
+    "    print(json.dumps([name for name in sys.modules if '.' not in name]))"
 )
 
 
-def loaded_by(folder: Path, *words: str) -> set[str]:
+def loaded_by(folder: Path, *words: str, status: int = 0) -> set[str]:
     """Run ``csm WORDS`` in a process of its own and return the packages that it has imported in the end."""
     variables = os.environ | {"CSM_CACHE": str(folder / "store")}
     line = [sys.executable, "-c", SAYING_WHAT_IS_LOADED, *words]
     ended = subprocess.run(line, cwd=folder, env=variables, capture_output=True, text=True, check=False)
-    assert ended.returncode == 0, ended.stderr
+    assert ended.returncode == status, ended.stderr
     return set(json.loads(ended.stdout.splitlines()[-1]))
 
 
@@ -39,6 +41,11 @@ def test_help_loads_nothing_heavy(command, tmp_path):
 
 def test_the_list_of_commands_and_the_package_load_no_numbers(tmp_path):
     assert not {"numpy", "hydra", "omegaconf"} & loaded_by(tmp_path, "--help")
+
+
+@pytest.mark.parametrize("command", ["train", "evaluate", "matrix", "prepare", "reproduce", "bench"])
+def test_a_misspelt_option_is_answered_before_lightning_is_loaded(command, tmp_path):
+    assert "lightning" not in loaded_by(tmp_path, command, "data.roott=x", status=2)
 
 
 @pytest.fixture

@@ -12,17 +12,20 @@ from typing import Any
 from omegaconf import DictConfig
 
 from csm.commands.app import command
-from csm.commands.groups import make_data, make_protocol, matching_of
+from csm.commands.groups import make_data, make_protocol, matching_of, register
 from csm.commands.outputs import require_results
-from csm.commands.train import conclude
-from csm.data.inspection import require_sound
 from csm.errors import ConfigError
-from csm.experiments.testing import measure_all, numbers
-from csm.matching.network import load_model
+
+register("data")
 
 
 def run(cfg: DictConfig) -> dict[str, Any]:
     """Test the checkpoint; descriptor and basis are those it was trained with."""
+    from csm.commands.tested import conclude
+    from csm.data.inspection import require_sound
+    from csm.experiments.testing import measure_all, numbers
+    from csm.matching.network import load_model
+
     if cfg.checkpoint is None:
         raise ConfigError("evaluate needs checkpoint=PATH, a .ckpt that csm train wrote")
     method = load_model(cfg.checkpoint)

@@ -10,21 +10,24 @@ if __name__ == "__main__":
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hydra import compose
 from omegaconf import DictConfig, open_dict
 
 from csm.commands.app import command
-from csm.commands.groups import make_protocol, matching_of, plain
+from csm.commands.groups import make_protocol, matching_of, plain, register
 from csm.commands.schema import require_valid
-from csm.commands.train import make_training, require_network_of_recipe
 from csm.errors import ConfigError
 from csm.evaluation.report import ResultRow, add_rows
 from csm.evaluation.tables import markdown_table
-from csm.experiments.matrix import Matrix, Row
 
-_PLACES = ("root", "test", "test_roots")
+if TYPE_CHECKING:  # Lightning is loaded when the options are known to be right
+    from csm.experiments.matrix import Row
+
+register("data", "descriptor", "model")
+
+_PLACES = ("root", "test", "test_roots", "test_forms")
 
 
 def run(cfg: DictConfig) -> dict[str, Any]:
@@ -42,6 +45,8 @@ def _kind(row: ResultRow) -> str:
 
 def fill(cfg: DictConfig, rows: Sequence[Row]) -> list[ResultRow]:
     """Fill the cells of these rows, print the table and return its averaged rows."""
+    from csm.experiments.matrix import Matrix
+
     matrix = Matrix(
         Path(cfg.folder), make_protocol(cfg), tuple(matching_of(cfg)), str(cfg.table), cfg.train, cfg.device
     )
@@ -71,6 +76,9 @@ def rows_of(cfg: DictConfig) -> list[Row]:
 
 
 def _row(cfg: DictConfig, name: str, seed: int) -> Row:
+    from csm.commands.training import make_training, require_network_of_recipe
+    from csm.experiments.matrix import Row
+
     overrides = [*map(str, cfg.rows[name]), *map(str, cfg.overrides)]
     train = compose("train", overrides=overrides)
     require_network_of_recipe(train, overrides)

@@ -7,171 +7,21 @@ from csm.commands.main import run_as_program
 if __name__ == "__main__":
     run_as_program(__file__)
 
-import sys
-from collections.abc import Sequence
 from typing import Any
 
-from hydra import compose
-from hydra.core.hydra_config import HydraConfig
-from hydra.types import RunMode
-from hydra.utils import instantiate
 from omegaconf import DictConfig
 
-from csm._counts import counted
-from csm.commands.app import command, output_folder
-from csm.commands.groups import make_data, make_protocol, matching_of, plain, register
-from csm.commands.outputs import require_results
-from csm.commands.processes import is_first, processes_to_start, train_together
-from csm.data.inspection import require_sound
-from csm.errors import ConfigError
-from csm.evaluation.tables import markdown_table
-from csm.experiments.callbacks import ValidationErrors
-from csm.experiments.pairs import worst_line
-from csm.experiments.ranks import NAME, part
-from csm.experiments.report import training_section, write_results
-from csm.experiments.testing import Tested, measure_all, numbers
-from csm.experiments.training import Training, fit
-from csm.learning.loading import FITTED, UNSEEN
-from csm.matching.base import require_device
-from csm.matching.network import NetworkMethod
-from csm.viewer.html import Section
+from csm.commands.app import command
+from csm.commands.groups import register
 
 register("data", "descriptor", "model")
 
-GROUPS = ("seed", "data", "descriptor", "model", "optimizer", "learning", "trainer")
-"""What TensorBoard compares runs by."""
-
 
 def run(cfg: DictConfig) -> dict[str, Any] | None:
-    """Train and, unless ``test=false``, test; return the numbers of the job, or None in a process that only helps."""
-    folder = output_folder()
-    require_network_of_recipe(cfg, HydraConfig.get().overrides.task)
-    training, protocol, matching = make_training(cfg), make_protocol(cfg), matching_of(cfg)
-    require_objective(cfg, training)
-    require_device(cfg.device)
-    require_results(cfg.results)
-    require_sound(training.data, test=cfg.test, exact=protocol.distance == "exact" and not protocol.fallback)
-    if processes := processes_to_start(training, folder):
-        return train_together(processes, folder)
-    if is_first() or cfg.trainer.get("strategy") != NAME:
-        tests = counted(len(training.data.split.test), "test shape")
-        print(f"{training.name}: {training.data.protocol}; {tests}", flush=True)
-    trained = fit(training, folder, cfg.resume)
-    if HydraConfig.get().mode == RunMode.RUN:  # the jobs of a sweep that torchrun started go on together
-        part()
-    if trained.rank:
-        return None
-    about = {"seconds": trained.seconds, "parameters": trained.parameters, "checkpoint": str(trained.checkpoint)}
-    print(f"trained for {trained.seconds / 60:.1f} minutes, {trained.parameters:,} parameters: {trained.checkpoint}")
-    found = {**about, **trained.measured}
-    if not cfg.test:
-        return with_objective(found, cfg.objective)
-    method = NetworkMethod(trained.module)
-    tested = measure_all(method, training.data, protocol, matching=matching, table=cfg.table, device=cfg.device)
-    conclude(cfg, tested, f"{training.name}: {method.training.get('protocol')}.", [training_section(trained)])
-    if training.logger is not None:
-        print(f"log:          {folder}  (tensorboard --logdir {folder})")
-    return with_objective(found | numbers(tested), cfg.objective)
+    """Train and test; Lightning, which takes seconds to load, is loaded when the options are known to be right."""
+    from csm.commands.training import train
 
-
-_NUMBERS = ("val/", "fit/", "train/", "step/", "age/", "exact/", "seconds", "parameters")
-_MEASURED = tuple(f"{group}/{name}" for group in (UNSEEN, FITTED) for name in ("age", "exact", "far", "flip"))
-
-
-def require_objective(cfg: DictConfig, training: Training) -> None:
-    """Raise a ConfigError if the objective of a sweep is a number that the training will not have."""
-    if cfg.objective is None:
-        return
-    name = str(cfg.objective)
-    if not name.startswith(_NUMBERS):
-        raise ConfigError(
-            f"objective={name}: no job has a number of that name; wanted one such as val/age, fit/age, train/loss, "
-            "age/SET, exact/SET or seconds"
-        )
-    if name in _MEASURED and not any(isinstance(each, ValidationErrors) for each in training.callbacks):
-        raise ConfigError(f"objective={name}: the callback that measures it was left out; wanted callbacks=default")
-    if name.startswith(f"{UNSEEN}/"):
-        data, every, epochs = training.data, cfg.trainer.check_val_every_n_epoch, cfg.trainer.max_epochs
-        if not data.validates_unseen or len(data.validation_names) < 2:
-            raise ConfigError(
-                f"objective={name}: no two shapes are held out to validate on, so there is no such number; "
-                "data.holdout=10 holds ten of the training shapes out"
-            )
-        if every and epochs and 0 < epochs < every:
-            raise ConfigError(
-                f"objective={name}: trainer.check_val_every_n_epoch={every} validates later than the last of "
-                f"trainer.max_epochs={epochs}; wanted at most {epochs}"
-            )
-    if name.startswith("age/") and not cfg.test:
-        raise ConfigError(f"objective={name}: test=false leaves it out; wanted test=true, or objective={UNSEEN}/age")
-
-
-def with_objective(found: dict[str, Any], name: str | None) -> dict[str, Any]:
-    """Return the numbers of a job and, as "objective", the one that a sweeper makes small, where it is there."""
-    if name is None:
-        return found
-    if not isinstance(value := found.get(name), int | float):
-        known = ", ".join(key for key, value in found.items() if isinstance(value, int | float))
-        print(f"csm: objective={name}: the job has no such number; it has {known}", file=sys.stderr)
-        return found
-    return {**found, "objective": value}
-
-
-def make_training(cfg: DictConfig) -> Training:
-    """Make the training of a configuration; a group that was left out (``~logger``, ``callbacks=null``) is empty."""
-    logger, callbacks = cfg.get("logger"), cfg.get("callbacks") or {}
-    settings = plain(cfg)
-    return Training(
-        name=str(cfg.name or plain(cfg.model)["name"]),
-        data=make_data(cfg),
-        network=plain(cfg.model),
-        options={**plain(cfg.optimizer), **plain(cfg.learning)},
-        trainer=instantiate(cfg.trainer, _partial_=True),
-        seed=int(cfg.seed),
-        callbacks=[_callback(name, callback) for name, callback in callbacks.items() if callback],
-        logger=instantiate(logger, _partial_=True) if logger else None,
-        settings={name: settings[name] for name in GROUPS},
-    )
-
-
-def _callback(name: object, node: Any) -> Any:
-    if not isinstance(node, DictConfig):
-        raise ConfigError(f"callbacks.{name}={node}: wanted a class and its options, {{_target_: PLACE, ...}}")
-    return instantiate(node)
-
-
-def require_network_of_recipe(cfg: DictConfig, overrides: Sequence[str]) -> None:
-    """Refuse an experiment that puts another network in the place of the one that a recipe is for.
-
-    Parameters
-    ----------
-    cfg
-        What the overrides made.
-    overrides
-        As on the command line, such as ``recipe=acscnn``.
-    """
-    chosen = {group: value for group, _, value in (text.partition("=") for text in overrides)}
-    recipe, experiment = chosen.get("recipe", "null"), chosen.get("experiment", "null")
-    if "null" in (recipe, experiment):
-        return
-    wanted = compose(
-        "train", [f"{group}={chosen[group]}" for group in ("recipe", "model") if group in chosen]
-    ).model.name
-    if cfg.model.name != wanted:
-        raise ConfigError(
-            f"recipe={recipe} trains {wanted}, but experiment={experiment} chooses {cfg.model.name}, which would be "
-            "trained at the rate of the recipe; take one of the two, or an experiment that leaves the network open, "
-            "such as faust_rival or humans_rival"
-        )
-
-
-def conclude(cfg: DictConfig, tested: list[Tested], notes: str, more: Sequence[Section] = ()) -> None:
-    """Keep the results of a test in the folder of the job, and print the table, the worst pairs and where all is."""
-    folder = output_folder()
-    page = write_results(tested, folder, cfg.results, notes, more)
-    print(markdown_table([t.row for t in tested]))
-    print(*map(worst_line, tested), sep="\n")
-    print(f"table:        {folder / 'rows.json'}, rows.csv\nreport:       {page}")
+    return train(cfg)
 
 
 main = command("train", folder=True, kept=("model.ckpt", "export/model.json"))(run)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -20,7 +20,6 @@ from csm.data.store import Store
 from csm.descriptors.base import record
 from csm.descriptors.presets import preset
 from csm.errors import ConfigError
-from csm.learning.module import CSMModule
 from csm.learning.samples import NetworkInput, ShapeSample, recipe_of, shape_sample
 from csm.mesh.correspondence import PointMap
 from csm.mesh.shape import Mesh
@@ -29,6 +28,9 @@ from csm.reproduction.published import NETWORKS
 from csm.reproduction.study import Context, Findings, Rows, Study
 from csm.reproduction.timing import BUSY, clocked, measured, timed_mesh
 from csm.viewer.comparisons import dots_figure
+
+if TYPE_CHECKING:  # what lists the studies need not wait for Lightning
+    from csm.learning.module import CSMModule
 
 REFERENCE = "csmcnn"
 """The method that ratios are taken to."""
@@ -143,6 +145,8 @@ def cost_of(hparams: Mapping[str, Any], mesh: Mesh, store: Store, threads: int, 
 
 
 def _measure(hparams: Mapping[str, Any], mesh: Mesh, root: str, threads: int, repeats: int) -> Arrays:
+    from csm.learning.module import CSMModule
+
     torch.set_num_threads(threads)
     torch.manual_seed(0)
     prepared = prepare_mesh(mesh, recipe_of(hparams), Store(root))

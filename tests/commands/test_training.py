@@ -7,7 +7,7 @@ import json
 import pytest
 import yaml
 
-from csm.commands.train import with_objective
+from csm.commands.training import with_objective
 from tests.commands.test_pipeline import SMALL, Bench
 
 TOYS = [*SMALL, "data.root=toys"]
