@@ -1,7 +1,8 @@
 """The tables of README.md and docs/, made from the json files under results/.
 
-``make tables`` rewrites every block between ``<!-- study: FILE -->`` (what ``csm reproduce`` found) or
-``<!-- headline -->`` (a few numbers of Tables 1 and 4) and ``<!-- end -->``; a test compares them.
+``make tables`` rewrites every block between ``<!-- study: FILE -->`` (what ``csm reproduce`` found),
+``<!-- benchmark: FILE -->`` (what a script of benchmarks/ measured) or ``<!-- headline -->`` (a few numbers of Tables 1
+and 4) and ``<!-- end -->``; a test compares them.
 """
 
 from __future__ import annotations
@@ -14,7 +15,24 @@ from pathlib import Path
 from csm.reproduction.study import Findings
 
 ROOT = Path(__file__).resolve().parent.parent
-BLOCK = re.compile(r"(<!-- (?:study: (\S+)|headline) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+BLOCK = re.compile(r"(<!-- (?:(study|benchmark): (\S+)|headline) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+MEASURED = {
+    "work": ("", "{}"),
+    "variant": ("", "{}"),
+    "vertices": ("vertices", "{:,}"),
+    "reference_ms": ("reference ms", "{:.0f}"),
+    "csm_ms": ("csm ms", "{:.0f}"),
+    "milliseconds": ("ms", "{:.0f}"),
+    "acd_paper_s": ("ACD s", "{:.1f}"),
+    "functions_s": ("128 functions s", "{:.1f}"),
+    "seconds": ("s", "{:.1f}"),
+    "processor_seconds": ("processor s", "{:.1f}"),
+    "ratio": ("ratio", "{:.2f}"),
+    "speedup": ("ratio", "{:.2f}"),
+    "megabytes": ("MB", "{:.0f}"),
+    "wrong": ("wrong partners", "{:.4f}"),
+}
+"""What the rows of benchmarks have -> title of the column, and how its numbers are written; other things stay out."""
 UNTRAINED = {"acd": "ACD", "asmwd": "ASMWD, the next best of eleven families"}
 REFINED = "ACD, refined: the default of `csm match` [^1]"
 OWN = "csm's own network, `experiment=faust` [^2]"
@@ -71,9 +89,20 @@ def study(path: Path) -> str:
     return f"{found.markdown()}\n"
 
 
+def benchmark(path: Path) -> str:
+    """Return the rows of a benchmark, and a line that says with how many threads and how often it was measured."""
+    kept = json.loads(path.read_text(encoding="utf-8"))
+    keys = [key for key in MEASURED if key in kept["rows"][0]]
+    head = _head(MEASURED[keys[0]][0], (MEASURED[key][0] for key in keys[1:]))
+    lines = [f"| {' | '.join(MEASURED[key][1].format(row[key]) for key in keys)} |" for row in kept["rows"]]
+    threads, repeats = (f"{kept[key]} {key[:-1] if kept[key] == 1 else key}" for key in ("threads", "repeats"))
+    return "\n".join([*head, *lines, "", f"{threads}, {repeats}; `{kept['command']}`"]) + "\n"
+
+
 def with_tables(text: str) -> str:
     """Return the text with every block made anew."""
-    return BLOCK.sub(lambda m: f"{m[1]}{study(ROOT / m[2]) if m[2] else headline()}{m[4]}", text)
+    make = {"study": study, "benchmark": benchmark}
+    return BLOCK.sub(lambda m: f"{m[1]}{make[m[2]](ROOT / m[3]) if m[2] else headline()}{m[5]}", text)
 
 
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))

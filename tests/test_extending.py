@@ -14,10 +14,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from csm.mesh.io import write_mesh
-from csm.mesh.shape import Mesh
-from tests.shapes import blob
-
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"^```(?:python|yaml) (\S+)(?: (\S+))?\n(.*?)^```$", re.DOTALL | re.MULTILINE)
@@ -48,10 +44,8 @@ def extended(tmp_path_factory: pytest.TempPathFactory) -> Path:
         code = path.read_text(encoding="utf-8")
         assert len(head.findall(code)) == 1, f"{place} has no {registry}"
         path.write_text(head.sub(lambda found, line=text: found[0] + line, code), encoding="utf-8")
-    base = blob(2)
-    for i in range(5):
-        bend = 0.05 * np.sin(base.vertices @ np.random.default_rng(i).normal(size=(3, 3)))
-        write_mesh(copy / f"hands/hand_{i:03d}.off", Mesh(base.vertices + bend, base.faces))
+    (making,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    subprocess.run([sys.executable, "-c", making], cwd=copy, check=True)
     return copy
 
 

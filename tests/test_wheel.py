@@ -32,6 +32,9 @@ SHORT = [
     "trainer.accelerator=cpu",
     "metric.distance=edge",
     "metric.sample=1",
+    "metric.points=10",
+    "callbacks=none",
+    "logger=none",
     "workers=0",
 ]
 

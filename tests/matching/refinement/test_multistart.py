@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import torch
 
+from csm.data.humans import humans_set
 from csm.data.store import Store
 from csm.errors import ConfigError
 from csm.matching.nearest import Nearest
@@ -76,9 +77,13 @@ def test_of_several_finalists_the_best_judged_is_taken(store):
     assert best <= alone + 0.02  # the text rounds
 
 
-def test_a_body_is_mapped_to_its_mirror_image_through_its_own_symmetry(store, small_human):
-    """Maps keep orientation, so the left hand goes to the left hand as the image has it: the image of the right one."""
-    body, at, flip = small_human, small_human.truth.indices, small_human.mirror.indices
+def test_a_body_is_mapped_to_its_mirror_image_through_its_own_symmetry(store):
+    """Maps keep orientation, so the left hand goes to the left hand as the image has it: the image of the right one.
+
+    At 700 vertices two maps may tie, and which is taken rests on the rounding of the machine.
+    """
+    body = humans_set("remeshed_1500", str(store.root)).load("s00_p00")
+    at, flip = body.truth.indices, body.mirror.indices
     source, target = described(body.mesh, store), described(mirrored(body.mesh), store)
     found = Multistart()(Nearest()(source, target), source, target).forward.vertex_map.indices
     surface = geodesics(target.mesh, "edge")
@@ -156,7 +161,7 @@ def test_symmetric_shapes_are_known_to_look_the_same_in_several_ways(store, name
 
 
 def test_symmetric_shapes_are_known_in_another_triangulation(store):
-    assert ambiguous(torus(), torus(minor=0.42, n=34, m=18), store)
+    assert ambiguous(torus(n=60, m=30), torus(minor=0.42, n=52, m=26), store)
     assert ambiguous(plane(30), plane(30, seed=3), store)
 
 
