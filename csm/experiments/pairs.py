@@ -84,23 +84,19 @@ def pair_viewer(tested: Tested, row: PairRow, view: View, what: str, *, errors: 
     what
         The pair in words, such as "the worst pair".
     errors
-        Of every vertex of the source, if they are known already; otherwise some points are measured by the heat
-        method, and what lies near a point takes its error.
+        What `shown_errors` returns, if it was asked before.
     """
     source, target = (tested.shapes.load(name).mesh for name in (row.source, row.target))
     here, there = (tested.method.describe(mesh, tested.store) for mesh in (source, target))
     found = match_both_ways(tested.matcher, here, there).forward
     forward = found.vertex_map
-    how = "errors are heat-method distances at all vertices"
-    if errors is None:
-        errors = spread(source, vertex_errors(tested, (row.source, row.target), source.n_vertices, POINTS))
-        how = f"errors are heat-method distances at up to {POINTS} points, each with its surroundings"
+    how = f"errors are heat-method distances at up to {POINTS} points, each with its surroundings"
     reference, normaliser = position_colors(target, up=view.up), tested.row.normaliser
     first = Panel(
         source,
         pull_colors(reference, forward.indices),
         to_reference=forward.indices,
-        errors=errors,
+        errors=shown_errors(tested, row, source) if errors is None else errors,
         confidence=None if found.confidence is None else found.confidence.values,
         features=np.asarray(here.features),
     )
@@ -129,6 +125,14 @@ def write_pairs(path: Path, tested: Tested) -> None:
     blocks: list[Table | Viewer] = [pairs_table(tested), *worst_viewers(tested, 1, common_view(tested))]
     title = f"{tested.row.method} on {tested.label}"
     write_html(path, report_html(title, [Section("Pairs, the worst first", blocks)], lead=tested.row.protocol))
+
+
+def shown_errors(tested: Tested, row: PairRow, source: Mesh) -> FloatArray:
+    """Return errors to look at, shape (n_vertices,): some points are measured, and what lies near one takes its error.
+
+    All vertices would take as long as the test itself.
+    """
+    return spread(source, vertex_errors(tested, (row.source, row.target), source.n_vertices, POINTS))
 
 
 def vertex_errors(tested: Tested, pair: tuple[str, str], n_vertices: int, points: int | None = None) -> FloatArray:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from csm._counts import counted
 from csm.evaluation.report import ResultRow, add_rows, write_curves_csv, write_rows, write_table_csv
 from csm.evaluation.tables import COLUMNS, table_lines
-from csm.experiments.pairs import common_view, pair_viewer, pairs_table, vertex_errors, worst_viewers
+from csm.experiments.pairs import common_view, pair_viewer, pairs_table, shown_errors, worst_viewers
 from csm.experiments.testing import Tested
 from csm.viewer.comparisons import training_figure
 from csm.viewer.figures import correspondence_figure, cqc_figure, figure_to_array, save_figure
@@ -102,7 +102,7 @@ def _example(tested: Tested, folder: Path) -> tuple[Figure, Viewer]:
     source, target = (tested.shapes.load(name).mesh for name in (typical.source, typical.target))
     here, there = (tested.method.describe(mesh, tested.store) for mesh in (source, target))
     indices = tested.matcher(here, there).indices
-    errors = vertex_errors(tested, (typical.source, typical.target), source.n_vertices)
+    errors = shown_errors(tested, typical, source)
     figure = correspondence_figure(source, target, indices, errors, view=view, normaliser=tested.row.normaliser)
     save_figure(folder / f"map_{tested.label.replace(', ', '_')}.png", figure)
     viewer = pair_viewer(tested, typical, view, "the pair with the median error of its set", errors=errors)
