@@ -55,6 +55,7 @@ STUDIES: Mapping[str, Entry] = {
     "refinement": Entry("errors before and after refinement", "refinement:Refinement"),
     "coarse": _learned("the methods of table4 on 1000 vertices, hardly cut short", "coarse", "coarse", "dots"),
     "humans_table": _learned("the methods of table4 on the built-in humans", "humans_table", "humans", "dots"),
+    "lab": _learned("what each part of csm's own network is worth, on held-out training shapes", "lab", "lab", "dots"),
     "ablation": _learned("K_s, terms and normalisation of CSMCNN", "ablation", "ablation", "sweeps"),
     "assumptions": Entry("errors when what the sources leave open is chosen otherwise", "training_pairs:Assumptions"),
     "stability": Entry("change of all descriptors across resolutions of one body", "resolutions:Stability"),
