@@ -179,6 +179,7 @@ def _serve(function: Callable[[Any], Any], tasks: Connection, answers: Connectio
 def _obey_parent_only() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the parent too, and the parent ends its workers
     signal.signal(signal.SIGTERM, _leave)
+    sys.unraisablehook = _leave_after_all
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     if sys.platform == "linux":
@@ -189,6 +190,14 @@ def _obey_parent_only() -> None:
 
 def _leave(_signal: int, _frame: FrameType | None) -> None:
     sys.exit(128 + signal.SIGTERM)
+
+
+def _leave_after_all(dropped: sys.UnraisableHookArgs) -> None:
+    """Send the signal to leave again if it came while an object was deleted, where Python drops what is raised."""
+    if isinstance(dropped.exc_value, SystemExit):
+        threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGTERM)).start()
+    else:
+        sys.__unraisablehook__(dropped)
 
 
 def _receive(tasks: Connection, todo: _Todo) -> None:

@@ -108,6 +108,28 @@ def test_what_is_advised_after_a_death_does_without_processes(task):
     assert set(parallel_map(process, [1, 2, 3], str, int(advised), what="", unit="", progress=False)) == {here}
 
 
+class Last:
+    """An object that is told to end while it is deleted, where Python drops the SystemExit."""
+
+    def __del__(self) -> None:
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(0.05)
+
+
+def delete_one(_: int) -> None:
+    Last()
+    time.sleep(20)
+
+
+@unix
+def test_a_stop_that_comes_while_an_object_is_deleted_is_obeyed_in_silence(capfd):
+    begun = time.monotonic()
+    with pytest.raises(ConfigError, match="status 143"):
+        parallel_map(delete_one, [0, 1], str, 2, what="delete", unit="task", progress=False)
+    assert time.monotonic() - begun < 15
+    assert capfd.readouterr().err == ""
+
+
 def test_an_error_that_cannot_travel_is_told_by_its_text():
     with pytest.raises(RuntimeError, match="Odd: a"):
         mapped("a", "unpicklable")
