@@ -2,9 +2,11 @@ import numpy as np
 import pytest
 
 from csm.data.folder import FolderDataModule
+from csm.data.humans import HumansDataModule
 from csm.data.inspection import data_problems, inspect, require_sound
 from csm.data.registry import recognise
 from csm.data.splits import Split
+from csm.data.store import Store
 from csm.descriptors import HKS
 from csm.errors import DataError
 from csm.mesh.io import read_mesh, write_map, write_mesh
@@ -133,3 +135,10 @@ def test_a_shape_with_fewer_vertices_than_eigenpairs_is_named_before_the_work(tm
     assert {problem.kind for problem in found} == {"too_small"}
     assert len(found) == 6
     assert "has 162 vertices, but 163 eigenpairs are asked for" in str(found[0])
+
+
+def test_a_form_of_the_built_in_humans_that_cannot_be_is_found_at_the_first_of_them(tmp_path):
+    options = {"descriptor": HKS(k=6, n_times=3), "basis_k": 8, "workers": 0, "store": Store(tmp_path)}
+    with pytest.raises(DataError, match="cannot refine 6899 vertices to 100"):
+        require_sound(HumansDataModule(test=["original"], test_forms=["refined_100"], **options))
+    require_sound(HumansDataModule(test=["original"], test_forms=["slivers_10"], **options))
