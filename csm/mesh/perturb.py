@@ -14,6 +14,7 @@ from csm.errors import MeshError
 from csm.mesh.mending import split
 from csm.mesh.remesh.edge_moves import edge_table, independent
 from csm.mesh.remesh.edge_moves import split as split_edges
+from csm.mesh.remesh.remesher import require_fit
 from csm.mesh.shape import Mesh
 from csm.mesh.topology import components, edge_graph, half_edges
 
@@ -55,6 +56,11 @@ def with_slivers(mesh: Mesh, share: float, seed: int = 0) -> Damaged:
     seed
         Of the draw.
 
+    Raises
+    ------
+    MeshError
+        If the mesh is not manifold and oriented.
+
     Examples
     --------
     >>> square = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
@@ -62,6 +68,7 @@ def with_slivers(mesh: Mesh, share: float, seed: int = 0) -> Damaged:
     >>> thin.mesh.n_vertices, thin.kept.tolist(), float(thin.mesh.area)
     (5, [0, 1, 2, 3, -1], 1.0)
     """
+    require_fit(mesh)
     rng = np.random.default_rng(seed)
     vertices, faces = mesh.vertices, mesh.faces
     wanted = mesh.n_vertices + round(share * mesh.n_vertices)

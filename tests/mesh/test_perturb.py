@@ -50,6 +50,12 @@ def test_slivers_keep_the_surface_and_its_vertices_and_are_thin(share):
     np.testing.assert_array_equal(with_slivers(mesh, share, seed=3).mesh.faces, made.mesh.faces)
 
 
+def test_slivers_need_a_manifold():
+    fan = Mesh(np.eye(5, 3) + np.arange(5)[:, None], [[0, 1, 2], [1, 0, 3], [0, 1, 4]], "three faces at an edge")
+    with pytest.raises(MeshError, match=r"three faces at an edge.*manifold"):
+        with_slivers(fan, 0.5)
+
+
 @pytest.mark.parametrize("fraction", [0.1, 0.4])
 def test_the_part_that_is_cut_lies_around_the_centre_and_has_its_area(fraction):
     mesh = sphere(4)

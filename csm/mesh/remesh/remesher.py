@@ -82,7 +82,7 @@ def refine(mesh: Mesh, n_vertices: int, seed: int = 0) -> Remeshed:
     >>> finer.mesh.n_vertices, bool((finer.mesh.vertices[:4] == square.vertices).all())
     (50, True)
     """
-    _require_fit(mesh)
+    require_fit(mesh)
     if n_vertices < mesh.n_vertices:
         raise MeshError(
             f"{mesh.label}: cannot refine {mesh.n_vertices} vertices to {n_vertices}; ask for more, or use `remesh`"
@@ -127,7 +127,7 @@ def remesh(mesh: Mesh, n_vertices: int, seed: int = 0, contrast: float = 1.0) ->
     MeshError
         If the mesh is not manifold and oriented, or its topology and corners do not allow so few vertices.
     """
-    _require_fit(mesh)
+    require_fit(mesh)
     rng = np.random.default_rng(seed)
     sizes = _graded_sizes(mesh)
     if contrast != 1:
@@ -202,7 +202,8 @@ def _along(mesh: Mesh, direction: FloatArray) -> FloatArray:
     return share
 
 
-def _require_fit(mesh: Mesh) -> None:
+def require_fit(mesh: Mesh) -> None:
+    """Raise a MeshError if edges of a mesh cannot be split, flipped and collapsed: it is no oriented manifold."""
     unfit = [f.text for f in check(mesh) if f.severity == "error" or f.kind in _UNFIT]
     if unfit:
         raise MeshError(
