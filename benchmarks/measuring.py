@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import resource
 import statistics
 import subprocess
 import sys
@@ -16,6 +15,7 @@ from typing import Any
 
 import torch
 
+from csm import _peak
 from csm.evaluation.provenance import provenance
 from csm.mesh.io import atomic_path
 
@@ -61,10 +61,9 @@ def peak_megabytes(variant: str, threads: int) -> float:
 
 def growth_megabytes(run: Run) -> float:
     """Return by how much one pass raises the peak of this process."""
-    unit = 2**20 if sys.platform == "darwin" else 2**10
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    before = _peak.peak_megabytes()
     run()
-    return (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / unit
+    return _peak.peak_megabytes() - before
 
 
 def write(name: str, chosen: argparse.Namespace, size: Mapping[str, float], rows: Sequence[Any]) -> None:

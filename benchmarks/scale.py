@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import subprocess
 import sys
 import time
@@ -24,6 +23,7 @@ import trimesh
 from measuring import options, write
 
 from csm import Mesh, Operators, load_humans, preset
+from csm._peak import peak_megabytes
 from csm.mesh.remesh import remesh
 
 SIZES = (30_000, 100_000, 300_000)
@@ -63,8 +63,7 @@ def measured(file: Path) -> Row:
     between = time.perf_counter()
     operators.lbo(128)
     done = time.perf_counter()
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
-    return Row(mesh.n_vertices, between - begun, done - between, done - begun, peak)
+    return Row(mesh.n_vertices, between - begun, done - between, done - begun, peak_megabytes())
 
 
 def in_a_process(n_vertices: int, threads: int, folder: Path) -> Row:
