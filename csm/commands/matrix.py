@@ -102,7 +102,10 @@ def identity_of(cfg: DictConfig) -> dict[str, Any]:
     trainer = settings["trainer"]
     found |= {f"trainer.{key}": trainer[key] for key in ("max_epochs", "max_time", "gradient_clip_val", "precision")}
     per_step = trainer["accumulate_grad_batches"]
-    return found | {"trainer.accumulate_grad_batches": per_step if per_step > 1 else None}
+    return found | {
+        "trainer.accumulate_grad_batches": per_step if per_step > 1 else None,
+        "pretrained": settings["pretrained"],
+    }
 
 
 main = command("matrix", folder=True)(run)

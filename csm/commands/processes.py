@@ -59,7 +59,7 @@ def processes_to_start(training: Training, folder: Path) -> int:
         If the settings of the trainer do not fit, or the processes of several machines are wanted of one command.
     """
     from csm.experiments.ranks import is_started_from_outside
-    from csm.experiments.training import make_trainer
+    from csm.experiments.trainer import make_trainer
 
     trainer = make_trainer(training, folder)
     if trainer.world_size == 1 or is_started_from_outside(trainer):

@@ -41,12 +41,14 @@ def train(cfg: DictConfig) -> dict[str, Any] | None:
     require_objective(cfg, training)
     require_device(cfg.device)
     require_results(cfg.results)
+    _ = training.source  # read now, so that a wrong path is told at once
     require_sound(training.data, test=cfg.test, exact=protocol.distance == "exact" and not protocol.fallback)
     if processes := processes_to_start(training, folder):
         return train_together(processes, folder)
     if is_first() or cfg.trainer.get("strategy") != NAME:
         tests = counted(len(training.data.split.test), "test shape")
-        print(f"{training.name}: {training.data.protocol}; {tests}", flush=True)
+        begins = f"; begins with the weights of {training.pretrained}" if training.pretrained else ""
+        print(f"{training.name}: {training.data.protocol}; {tests}{begins}", flush=True)
     trained = fit(training, folder, cfg.resume)
     if HydraConfig.get().mode == RunMode.RUN:  # the jobs of a sweep that torchrun started go on together
         part()
@@ -122,6 +124,7 @@ def make_training(cfg: DictConfig) -> Training:
         callbacks=[_callback(name, callback) for name, callback in callbacks.items() if callback],
         logger=instantiate(logger, _partial_=True) if logger else None,
         settings={name: settings[name] for name in GROUPS},
+        pretrained=None if cfg.pretrained is None else str(cfg.pretrained),
     )
 
 

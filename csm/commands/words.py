@@ -32,7 +32,7 @@ LISTS = ("targets", "paths")
 
 PATHS = frozenset(
     (
-        *("source", "target", "out", "mesh", "in", "checkpoint", "folder", "resume", "results", "store"),
+        *("source", "target", "out", "mesh", "in", "checkpoint", "folder", "resume", "pretrained", "results", "store"),
         "paths",
         *("data.root", "data.split", "data.test_roots"),
     )

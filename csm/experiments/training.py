@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import logging
 import signal
-import sys
-import tempfile
 import threading
 import time
-import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import lightning as L
 import torch
-from lightning.fabric.utilities.exceptions import MisconfigurationException
-from lightning.pytorch.callbacks import ModelCheckpoint
-from lightning.pytorch.loggers import CSVLogger, Logger, TensorBoardLogger
+from lightning.pytorch.loggers import Logger
 
 from csm._locks import locked
 from csm._signals import saying
@@ -27,30 +23,23 @@ from csm.data.base import DataModule
 from csm.descriptors.base import record
 from csm.errors import ConfigError
 from csm.evaluation.provenance import provenance
-from csm.experiments.callbacks import EpochLines, FiniteLoss, ValidationErrors, require_monitored
-from csm.experiments.history import Curves, History, history_of
-from csm.experiments.ranks import (
-    SharedStatistics,
-    prepare_once,
-    require_one_or_ranks,
-    require_same_begin,
-    require_single_precision,
-)
-from csm.experiments.resuming import (
-    AUTO,
-    RandomStates,
-    WholeCheckpoints,
-    last_checkpoint,
-    require_same_settings,
-    resume_point,
-)
+from csm.experiments.callbacks import EpochLines, ValidationErrors
+from csm.experiments.history import Curves, history_of
+from csm.experiments.ranks import prepare_once, require_same_begin
+from csm.experiments.resuming import AUTO, last_checkpoint, require_same_settings, resume_point
 from csm.experiments.tensorboard import TensorBoardPanels
+from csm.experiments.trainer import make_trainer, shapes_per_step
 from csm.learning.checkpoint import export_module
+from csm.learning.describer import Describer
 from csm.learning.loading import LightningData
 from csm.learning.module import CSMModule
 from csm.learning.places import template_of
+from csm.learning.pretrained import origin, require_same_trunk, take_over
 from csm.learning.samples import also_classes
 from csm.learning.twins import learn_twins
+from csm.matching.network import load_model
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +66,9 @@ class Training:
         Called with ``save_dir=``; None for no log.
     settings
         All settings as plain data, for TensorBoard's table of hyper-parameters.
+    pretrained
+        A trained network whose weights it begins with, as `csm.load_model` takes it; None for weights that are drawn.
+        The classifier is taken where the set is the same, else it is a new one.
     """
 
     name: str
@@ -88,6 +80,12 @@ class Training:
     callbacks: Sequence[L.Callback] = field(default_factory=lambda: default_callbacks())
     logger: Callable[..., Logger] | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
+    pretrained: str | None = None
+
+    @cached_property
+    def source(self) -> Describer | None:
+        """The trained network that it begins with."""
+        return None if self.pretrained is None else load_model(self.pretrained).module
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +147,12 @@ def _fit(training: Training, trainer: L.Trainer, folder: Path, resume: Path | st
     prepare_once(trainer, loaded)
     require_same_begin(trainer, folder, begin)
     module = make_module(training, loaded.n_features, trainer.max_epochs, shapes_per_step(trainer))
-    if module.inputs is not None:
+    if training.source is not None:
+        with_classifier = take_over(module, training.source)
+        _log.info(
+            "begins with %s, %s", training.pretrained, "its classifier too" if with_classifier else "a new classifier"
+        )
+    elif module.inputs is not None:
         module.inputs.learn(sample.features for sample in loaded.fitted())
     if module.places is not None:
         template = template_of(loaded.sample(name) for name in training.data.fit_names)
@@ -171,19 +174,18 @@ def _fit(training: Training, trainer: L.Trainer, folder: Path, resume: Path | st
     return Trained(module, checkpoint, seconds, measured, trainer.global_rank, history.curves)
 
 
-def shapes_per_step(trainer: L.Trainer) -> int:
-    """Return over how many shapes the gradient of one step is taken."""
-    return int(trainer.accumulate_grad_batches) * trainer.world_size
-
-
 def sketch(training: Training, epochs: int | None, per_step: int | None = None) -> CSMModule:
     """Make the module without memory for its weights: what does not fit fails here, before the preparation."""
+    source = training.source
     try:
         with torch.device("meta"):
-            return make_module(training, 1, epochs, per_step)
+            made = make_module(training, 1 if source is None else source.settings["in_channels"], epochs, per_step)
     except (IndexError, RuntimeError, TypeError, ZeroDivisionError) as error:
         options = ", ".join(f"{key}={value}" for key, value in training.network.items())
         raise ConfigError(f"model: no network can be made with {options} ({error})") from error
+    if source is not None:
+        require_same_trunk(made, source, str(training.pretrained))
+    return made
 
 
 def _what_is_kept(folder: Path, trainer: L.Trainer) -> str:
@@ -235,66 +237,8 @@ def make_module(
             "seed": training.seed,
             "epochs": epochs,
             **({} if per_step is None else {"shapes_per_step": per_step}),
+            **({} if training.source is None else {"pretrained": origin(training.source)}),
             "command": made.command,
             "commit": made.commit,
         },
     )
-
-
-def make_trainer(training: Training, folder: Path) -> L.Trainer:
-    """Make the trainer of a training in a folder; ConfigError if its settings do not fit each other or this machine.
-
-    Lightning's bar needs a terminal, elsewhere `EpochLines` takes its place.
-    """
-    _quiet_lightning()
-    require_monitored(training.callbacks, training.data)
-    last = last_checkpoint(folder)
-    keep = ModelCheckpoint(last.parent, filename=last.stem, enable_version_counter=False, save_on_train_epoch_end=True)
-    for callback in training.callbacks:
-        if isinstance(callback, TensorBoardPanels) and not callback.hparams:
-            callback.hparams = training.settings
-    try:
-        trainer = _trainer(training, folder, keep)
-    except (ValueError, TypeError, MisconfigurationException) as error:
-        raise ConfigError(f"trainer: {' '.join(str(error).split())}") from error
-    require_one_or_ranks(trainer)
-    require_single_precision(trainer)
-    return trainer
-
-
-def _trainer(training: Training, folder: Path, keep: ModelCheckpoint) -> L.Trainer:
-    return training.trainer(
-        callbacks=[SharedStatistics(), *training.callbacks, RandomStates(), FiniteLoss(), History(), keep],
-        use_distributed_sampler=False,  # the data share themselves out
-        plugins=[WholeCheckpoints()],
-        logger=_make_logger(training, folder),
-        default_root_dir=folder,
-        **({} if sys.stdout.isatty() else {"enable_progress_bar": False}),
-    )
-
-
-def _make_logger(training: Training, folder: Path) -> Logger | bool:
-    if training.logger is None:
-        return False
-    try:
-        with tempfile.TemporaryDirectory(prefix="csm-") as elsewhere:  # what it refuses, it refuses when it writes
-            tried = training.logger(save_dir=elsewhere)
-            if isinstance(tried, TensorBoardLogger | CSVLogger):  # others may begin a run somewhere
-                _ = tried.experiment
-        return training.logger(save_dir=folder)
-    except ModuleNotFoundError as error:
-        raise ConfigError(
-            f"logger: a library is not installed ({error}); pip install it, or choose logger=csv"
-        ) from error
-    except TypeError as error:
-        raise ConfigError(f"logger: {error}") from error
-
-
-def _quiet_lightning() -> None:
-    """Keep Lightning's hints and advertisements out of the output; its warnings stay."""
-    logging.getLogger("lightning.pytorch").setLevel(logging.WARNING)
-    logging.getLogger("lightning.fabric").setLevel(logging.WARNING)
-    warnings.filterwarnings("ignore", message=r".*LeafSpec.*is deprecated")
-    warnings.filterwarnings("ignore", message=r".*does not have many workers.*")
-    warnings.filterwarnings("ignore", message=r"The dirpath has changed")
-    warnings.filterwarnings("ignore", message=r"Checkpoint directory .* exists and is not empty")

@@ -25,6 +25,8 @@ TOYS = [*SMALL, "data.root=toys"]
         ([*TOYS, "objective=nonsense"], "objective=nonsense: no job has a number of that name"),
         ([*TOYS, "objective=fit/age", "callbacks=none"], "fit/age: the callback that measures it was left out"),
         ([*TOYS, "objective=age/toys", "test=false"], "objective=age/toys: test=false leaves it out"),
+        ([*TOYS, "pretrained=nowhere.ckpt"], "nowhere.ckpt: there is no such checkpoint"),
+        ([*TOYS, "pretrained=humans"], "pretrained=humans: its input is another descriptor (stack"),
         (["recipe=acscnn", "experiment=humans_paper"], "experiment=humans_paper chooses csmcnn"),
     ],
 )

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import sys
 from collections import Counter
 from datetime import timedelta
 from functools import partial
@@ -10,7 +9,6 @@ import numpy as np
 import pytest
 import torch
 from hydra.utils import instantiate
-from lightning.pytorch.callbacks import ProgressBar
 from lightning.pytorch.loggers import CSVLogger
 from omegaconf import OmegaConf
 
@@ -18,7 +16,6 @@ from csm.commands.choices import config_folder
 from csm.data.base import DataModule
 from csm.descriptors.base import record
 from csm.errors import ConfigError, DataError
-from csm.experiments import training as module
 from csm.experiments.callbacks import EpochLines, ValidationErrors
 from csm.experiments.tensorboard import TensorBoardPanels
 from csm.experiments.training import Training, default_callbacks, fit, last_checkpoint, make_module
@@ -148,20 +145,6 @@ def test_the_default_callbacks_are_those_of_the_command(tmp_path):
     assert one[0] is not other[0]
 
 
-def test_panels_get_the_settings_of_the_training_unless_they_have_some(tmp_path):
-    empty, own = TensorBoardPanels(), TensorBoardPanels({"mine": 1})
-    module.make_trainer(a_training(tmp_path, callbacks=[empty, own], settings={"seed": 3}), tmp_path)
-    assert (empty.hparams, own.hparams) == ({"seed": 3}, {"mine": 1})
-
-
-@pytest.mark.parametrize(("terminal", "wanted", "bar"), [(1, 1, 1), (0, 1, 0), (1, 0, 0), (0, 0, 0)])
-def test_a_bar_is_for_terminals(tmp_path, monkeypatch, terminal, wanted, bar):
-    monkeypatch.setattr(sys.stdout, "isatty", lambda: bool(terminal))
-    trainer = partial(L.Trainer, **(QUICK | {"enable_progress_bar": bool(wanted)}))
-    made = module.make_trainer(a_training(tmp_path, trainer=trainer), tmp_path)
-    assert isinstance(made.progress_bar_callback, ProgressBar) == bool(bar)
-
-
 def test_a_module_is_made_for_the_shapes_of_the_data(tmp_path):
     training = a_training(tmp_path)
     made = make_module(training, n_features=16, epochs=9)
@@ -223,3 +206,22 @@ def test_other_loggers_write_on_this_machine(tmp_path, monkeypatch, name):
     logger = instantiate(OmegaConf.load(config_folder() / "logger" / f"{name}.yaml"), _partial_=True)
     fit(a_training(tmp_path, logger=logger), tmp_path / "run")
     assert any(name in path.name for path in tmp_path.rglob("*"))
+
+
+def test_a_training_begins_with_the_weights_of_another(tmp_path):
+    first = fit(a_training(tmp_path, 2), tmp_path / "first")
+    still = a_training(tmp_path, options={"lr": 0.0}, pretrained=str(first.checkpoint))
+    again = fit(still, tmp_path / "again").module
+    for name, weights in first.module.network.named_parameters():
+        torch.testing.assert_close(again.network.get_parameter(name), weights, rtol=0, atol=0)
+    assert again.hparams["training"]["pretrained"] == {"name": "toy", "set": "toys", "epochs": 2}
+
+
+def test_a_network_that_does_not_fit_is_refused_before_the_preparation(tmp_path, monkeypatch):
+    first = fit(a_training(tmp_path), tmp_path / "first")
+    monkeypatch.setattr(DataModule, "prepare", lambda data: pytest.fail("prepared"))
+    wider = NETWORK | {"descriptor_channels": 32}
+    with pytest.raises(ConfigError, match="its layers are others"):
+        fit(a_training(tmp_path, network=wider, pretrained=str(first.checkpoint)), tmp_path / "run")
+    with pytest.raises(DataError, match="nowhere: there is no such checkpoint"):
+        fit(a_training(tmp_path, pretrained="nowhere"), tmp_path / "run")
