@@ -29,6 +29,13 @@ MEASURED = {
     "processor_seconds": ("processor s", "{:.1f}"),
     "ratio": ("ratio", "{:.2f}"),
     "speedup": ("ratio", "{:.2f}"),
+    "goal": ("goal", "{:.3g}"),
+    "pairs": ("pairs", "{}"),
+    "error": ("error", "{:.1f}"),
+    "rest": ("rest of the step %", "{:.0f}"),
+    "factor_share": ("factor %", "{:.0f}"),
+    "solve_share": ("solve %", "{:.0f}"),
+    "check_share": ("check %", "{:.0f}"),
     "megabytes": ("MB", "{:.0f}"),
     "wrong": ("wrong partners", "{:.4f}"),
 }
@@ -94,9 +101,13 @@ def benchmark(path: Path) -> str:
     kept = json.loads(path.read_text(encoding="utf-8"))
     keys = [key for key in MEASURED if key in kept["rows"][0]]
     head = _head(MEASURED[keys[0]][0], (MEASURED[key][0] for key in keys[1:]))
-    lines = [f"| {' | '.join(MEASURED[key][1].format(row[key]) for key in keys)} |" for row in kept["rows"]]
+    lines = [f"| {' | '.join(_written(key, row[key]) for key in keys)} |" for row in kept["rows"]]
     threads, repeats = (f"{kept[key]} {key[:-1] if kept[key] == 1 else key}" for key in ("threads", "repeats"))
     return "\n".join([*head, *lines, "", f"{threads}, {repeats}; `{kept['command']}`"]) + "\n"
+
+
+def _written(key: str, value: object) -> str:
+    return "" if value is None else MEASURED[key][1].format(value)
 
 
 def with_tables(text: str) -> str:

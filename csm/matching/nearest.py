@@ -15,6 +15,7 @@ from csm.matching.maps import VertexMap
 from csm.matching.rows import Rows, as_array, is_tensor
 
 _MAX_ELEMENTS = 2**25  # of one block of distances: 128 MiB in float32
+_GROUP = 32  # candidates whose least score is taken first
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Nearest(Matcher):
         return VertexMap(indices, target.mesh.n_vertices, source.mesh.name, target.mesh.name)
 
 
-def nearest(queries: Rows, candidates: Rows, *, at: IntArray | None = None, block: int = 256) -> IntArray:
+def nearest(queries: Rows, candidates: Rows, *, at: IntArray | None = None, block: int = 512) -> IntArray:
     """Find the nearest candidate (Euclidean) of each query, in blocks of bounded memory.
 
     float32 rows are compared by float32 products first; queries for which rounding could decide are done again in
@@ -89,25 +90,45 @@ def _require_finite(finite: bool) -> None:
 
 
 def _search(q: NDArray[Any], c: NDArray[Any], centre: NDArray[Any], block: int) -> IntArray:
-    """Return the first candidate within rounding of the nearest; float32 asks float64 which one that is."""
-    near_q, near_c = q - centre, c - centre
-    half_norms = 0.5 * np.einsum("ij,ij->i", near_c, near_c)
-    largest = np.sqrt(half_norms.max())
+    """Return the first candidate within rounding of the nearest; float32 asks float64 which one that is.
+
+    The scores of a block of queries, half the squared distances less |q|^2 / 2, are a product of matrices; what follows
+    reads them once, for the least of every 32 candidates, and looks closer where that tells it to.
+    """
+    queries, table, largest = _factors(q - centre, c - centre)
+    groups = table.shape[1] // _GROUP
     rounding = 4.0 * np.sqrt(c.shape[1]) * np.finfo(c.dtype).eps * largest
-    limits = rounding * (np.linalg.norm(near_q, axis=1) + largest)
+    limits = rounding * (np.linalg.norm(queries[:, :-1], axis=1) + largest)
     first = np.empty(len(q), dtype=np.int64)
-    scores = np.empty((min(block, len(q)), len(c)), dtype=c.dtype)  # one piece of memory that stays in the cache
+    scores = np.empty((min(block, len(q)), table.shape[1]), dtype=c.dtype)  # one piece of memory for all blocks
     for begin in range(0, len(q), block):
-        part = near_q[begin : begin + block]
+        part = queries[begin : begin + block]
         score = scores[: len(part)]
-        np.matmul(part, near_c.T, out=score)
-        np.subtract(half_norms, score, out=score)  # half the squared distance, less |q|^2 / 2
-        first[begin : begin + block] = score.argmin(1)
-        near = score <= (score.min(1) + limits[begin : begin + block])[:, None]
-        unsure = np.flatnonzero(np.count_nonzero(near, axis=1) > 1)
+        np.matmul(part, table, out=score)
+        grouped = score.reshape(len(part), _GROUP, groups)
+        least = grouped.min(axis=1)
+        best = least.argmin(1)
+        within = grouped[np.arange(len(part)), :, best]
+        first[begin : begin + block] = within.argmin(1) * groups + best
+        limit = (least.min(1) + limits[begin : begin + block])[:, None]
+        several = [np.count_nonzero(each <= limit, axis=1) > 1 for each in (least, within)]
+        unsure = np.flatnonzero(several[0] | several[1])
         if len(unsure):
-            first[begin + unsure] = _first_of(near[unsure], q[begin + unsure], c, centre, block)
+            near = score[unsure, : len(c)] <= limit[unsure]
+            first[begin + unsure] = _first_of(near, q[begin + unsure], c, centre, block)
     return first
+
+
+def _factors(q: NDArray[Any], c: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], float]:
+    """Return matrices whose product is |c|^2 / 2 - q c, infinite in columns that fill a group, and the greatest |c|."""
+    (n, width), fill = c.shape, -len(c) % _GROUP
+    half_norms = 0.5 * np.einsum("ij,ij->i", c, c)
+    table = np.zeros((n + fill, width + 1), dtype=c.dtype)
+    np.negative(c, out=table[:n, :-1])
+    table[:n, -1], table[n:, -1] = half_norms, np.inf
+    queries = np.ones((len(q), width + 1), dtype=q.dtype)
+    queries[:, :-1] = q
+    return queries, table.T, float(np.sqrt(half_norms.max()))
 
 
 def _first_of(near: NDArray[np.bool_], q: NDArray[Any], c: NDArray[Any], centre: NDArray[Any], block: int) -> IntArray:
