@@ -6,6 +6,7 @@ import re
 import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
@@ -16,7 +17,7 @@ from csm.data.store import Store
 from csm.errors import ConfigError
 from csm.mesh.correspondence import Direction, PointMap
 from csm.mesh.perturb import Damaged, grown_together, with_slivers, without_part
-from csm.mesh.remesh import refine, remesh
+from csm.mesh.remesh import Remeshed, refine, remesh
 from csm.mesh.shape import Mesh
 
 Variant: TypeAlias = Literal["refined", "remeshed", "uneven", "slivers", "cut", "bridged"]
@@ -107,19 +108,15 @@ class Variation:
         return store.fetch("remesh", original, params, lambda: _MAKERS[self.variant](original, self.amount, seed))
 
 
-def _refined(original: Mesh, n_vertices: int, seed: int) -> Arrays:
-    made = refine(original, n_vertices, seed)
-    return _arrays(made.mesh, made.truth.indices)
+_Maker: TypeAlias = Callable[[Mesh, int, int], Arrays]
 
 
-def _remeshed(original: Mesh, n_vertices: int, seed: int) -> Arrays:
-    made = remesh(original, n_vertices, seed)
-    return _arrays(made.mesh, made.truth.indices)
+def _remade(make: Callable[[Mesh, int, int], Remeshed]) -> _Maker:
+    def maker(original: Mesh, n_vertices: int, seed: int) -> Arrays:
+        made = make(original, n_vertices, seed)
+        return _arrays(made.mesh, made.truth.indices)
 
-
-def _uneven(original: Mesh, n_vertices: int, seed: int) -> Arrays:
-    made = remesh(original, n_vertices, seed, _CONTRAST)
-    return _arrays(made.mesh, made.truth.indices)
+    return maker
 
 
 def _slivers(original: Mesh, percent: int, seed: int) -> Arrays:
@@ -135,10 +132,10 @@ def _bridged(original: Mesh, percent: int, seed: int) -> Arrays:
     return _damaged(original, grown_together(original, percent / 100))
 
 
-_MAKERS: Mapping[Variant, Callable[[Mesh, int, int], Arrays]] = {
-    "refined": _refined,
-    "remeshed": _remeshed,
-    "uneven": _uneven,
+_MAKERS: Mapping[Variant, _Maker] = {
+    "refined": _remade(refine),
+    "remeshed": _remade(remesh),
+    "uneven": _remade(partial(remesh, contrast=_CONTRAST)),
     "slivers": _slivers,
     "cut": _cut,
     "bridged": _bridged,
