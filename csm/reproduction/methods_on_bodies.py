@@ -61,16 +61,18 @@ class OnBodiesWithNetworks(OnBodies):
 
         ConfigError if there is none or a preset is unknown, DataError if a checkpoint cannot be read.
         """
-        found: list[Method] = [DescriptorMethod(preset(name), label(name)) for name in self.descriptors]
-        if self.checkpoints is None:
-            found += trained_on(bodies.original.name, context.out)
-        else:
-            found += [load_model(path, name) for name, path in self.checkpoints.items()]
-        if not found:
+        if not (found := self.optional_methods(context, bodies)):
             raise ConfigError(
                 "there is nothing to compare: name a descriptor, or a checkpoint as checkpoints={NAME:PATH}"
             )
         return found
+
+    def optional_methods(self, context: Context, bodies: Bodies) -> list[Method]:
+        """Return the same, also if there is none."""
+        found: list[Method] = [DescriptorMethod(preset(name), label(name)) for name in self.descriptors]
+        if self.checkpoints is None:
+            return found + trained_on(bodies.original.name, context.out)
+        return found + [load_model(path, name) for name, path in self.checkpoints.items()]
 
 
 def trained_on(name: str, out: Path) -> list[NetworkMethod]:

@@ -59,6 +59,9 @@ STUDIES: Mapping[str, Entry] = {
     "ablation": _learned("K_s, terms and normalisation of CSMCNN", "ablation", "ablation", "sweeps"),
     "assumptions": Entry("errors when what the sources leave open is chosen otherwise", "training_pairs:Assumptions"),
     "stability": Entry("change of all descriptors across resolutions of one body", "resolutions:Stability"),
+    "triangulations": Entry(
+        "errors of a perfect map and of networks in other triangulations", "triangulations:Triangulations"
+    ),
     "benchmark_peers": Entry("errors, seconds and memory of csm, pyFM and geomfum side by side", "peers:Peers"),
 }
 """Name of the study -> its purpose and class.  A new study is one class and one line here."""
