@@ -20,7 +20,7 @@ from csm.commands.groups import make_protocol, matching_of, plain, register
 from csm.commands.schema import require_valid
 from csm.errors import ConfigError
 from csm.evaluation.report import ResultRow, add_rows
-from csm.evaluation.tables import markdown_table
+from csm.evaluation.tables import LEGEND, markdown_table
 
 if TYPE_CHECKING:  # Lightning is loaded when the options are known to be right
     from csm.experiments.matrix import Row
@@ -51,7 +51,7 @@ def fill(cfg: DictConfig, rows: Sequence[Row]) -> list[ResultRow]:
         Path(cfg.folder), make_protocol(cfg), tuple(matching_of(cfg)), str(cfg.table), cfg.train, cfg.device
     )
     table = matrix.fill(rows)
-    print(markdown_table(table))
+    print(markdown_table(table) + LEGEND)
     return table
 
 

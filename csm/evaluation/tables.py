@@ -22,6 +22,12 @@ COLUMNS = (
 )
 """Titles of the columns of `table_lines`."""
 
+LEGEND = (
+    "AGE: mean geodesic error; p95: 95 % of the points err less; both in thousandths of the normaliser. exact: points "
+    "at the true vertex. flips: points nearer to the mirrored truth."
+)
+"""What a printed table does not say in its titles."""
+
 
 def table_lines(rows: Sequence[ResultRow]) -> list[tuple[str, ...]]:
     """Return the cells of a table with one line per row, in the order of `COLUMNS`.
