@@ -20,7 +20,7 @@ from csm._counts import counted
 from csm.commands.app import command
 from csm.data.folders import FolderSet, Missing, SameFaces
 from csm.data.inspection import Inspected, inspect
-from csm.data.registry import recognise
+from csm.data.registry import layouts, recognise
 from csm.errors import ConfigError, CsmError, DataError
 from csm.matching.subjects import subject_of
 from csm.mesh.check import Finding, require_usable
@@ -66,6 +66,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
             report = check_folder(paths[0])
         except DataError as error:
             if cfg.use == "train" or not list_files(paths[0], *READABLE):
+                print("\n".join(_known_sets()))
                 raise
             print(f"No data set ({error}), so each mesh is checked as one to match.\n")
             return check_files(paths)
@@ -79,7 +80,8 @@ def _conclude(report: Report, folder: Path) -> dict[str, Any]:
     print(report)
     if report.n_unusable:
         raise DataError(
-            f"{folder}: {report.n_unusable} of {counted(len(report.rows), 'shape')} cannot be used, see the table"
+            f"{folder}: {report.n_unusable} of {counted(len(report.rows), 'shape')} cannot be used as a set with known "
+            f"correspondence, see the table; csm check {folder} use=match checks meshes that are only to be matched"
         )
     return {"shapes": len(report.rows), "missing": len(report.shapes.missing)}
 
@@ -156,16 +158,26 @@ def _findings(row: Inspected) -> str:
 
 def _summary(report: Report) -> list[str]:
     shapes, rows = report.shapes, report.rows
+    known = sum(row.n_truth is not None for row in rows)
     noted = sum(bool(row.findings) for row in rows if row.usable)
     lines = [
         f"{shapes.root}: {shapes.layout.title}, called {shapes.name}",
-        f"{counted(len(rows), 'shape')}, {len(shapes.mapped)} with correspondence; {report.n_unusable} cannot be used, "
+        f"{counted(len(rows), 'shape')}, {known} with correspondence; {report.n_unusable} cannot be used, "
         f"{noted} usable with notes",
     ]
     if shapes.pairs:
         lines.append(f"{counted(len(shapes.pairs), 'test pair')}, {len(shapes.mapped_pairs)} with both maps")
     lines += [f"list {name}: {counted(len(names), 'shape')}" for name, names in shapes.lists.items()]
     return lines
+
+
+def _known_sets() -> list[str]:
+    """Return where the sets that csm knows are published."""
+    lines = ["Sets that csm recognises, and where they are published:"]
+    for layout in layouts():
+        about = f"{layout.title}: {layout.origin}"
+        lines += textwrap.wrap(about, 110, initial_indent="  ", subsequent_indent="    ", break_on_hyphens=False)
+    return [*lines, ""]
 
 
 def _what_is_missing(missing: Sequence[Missing]) -> list[str]:

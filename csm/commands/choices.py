@@ -48,14 +48,33 @@ BENCHES = {"descriptors": "table2", "networks": "table6", "matching": "benchmark
 """What ``csm bench`` can measure, with the study that does it."""
 
 
-def options_of(group: str) -> list[str]:
+def options_of(group: str, command: str = "") -> list[str]:
     """Return the names that can be chosen of a group: those from a registry, and those of yaml files.
+
+    Of experiments, `csm matrix` is offered tables of several rows, and other commands single trainings.
 
     Examples
     --------
     >>> options_of("data")[:2], options_of("logger")
     (['humans', 'faust'], ['csv', 'mlflow', 'none', 'tensorboard', 'wandb'])
+    >>> "table4" in options_of("experiment", "train"), "table4" in options_of("experiment", "matrix")
+    (False, True)
     """
     made = NAMES[group]() if group in NAMES else ()
     files = sorted(path.stem for path in (config_folder() / group).glob("*.yaml"))
-    return list(dict.fromkeys([*made, *files]))
+    names = list(dict.fromkeys([*made, *files]))
+    if group != "experiment" or not command:
+        return names
+    return [name for name in names if is_table(name) == (command == "matrix")]
+
+
+def is_table(experiment: str) -> bool:
+    """Tell whether an experiment is a table of several rows, which `csm matrix` fills; one that is not known is none.
+
+    Examples
+    --------
+    >>> is_table("table4"), is_table("faust")
+    (True, False)
+    """
+    file = config_folder() / "experiment" / f"{experiment}.yaml"
+    return file.is_file() and any(line.startswith("rows:") for line in file.read_text(encoding="utf-8").splitlines())

@@ -93,7 +93,11 @@ def candidates(line: str) -> list[str]:
         return []
     key, equals, _ = word.partition("=")
     page = read_page(before[0])
-    found = _values(key, page) if equals else [*studies_of(before[0]), *(f"{name}=" for name in _keys(before[0], page))]
+    found = (
+        _values(before[0], key, page)
+        if equals
+        else [*studies_of(before[0]), *(f"{name}=" for name in _keys(before[0], page))]
+    )
     return [candidate for candidate in found if candidate.startswith(word)]
 
 
@@ -107,12 +111,12 @@ def _keys(command: str, page: Page) -> list[str]:
     return list(dict.fromkeys(keys))
 
 
-def _values(key: str, page: Page) -> list[str]:
+def _values(command: str, key: str, page: Page) -> list[str]:
     """Return KEY=VALUE for all values that are known of a key; none of a path."""
     if key in PATHS:
         return []
     if any(key == group for group, *_ in page.groups):
-        return [f"{key}={name}" for name in options_of(key)]
+        return [f"{key}={name}" for name in options_of(key, command)]
     if key in _NAMES:
         return [f"{key}={name}" for name in _NAMES[key]()]
     if any(key == option and value in ("true", "false") for option, value, _ in page.options):

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from hydra.core.hydra_config import HydraConfig
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
@@ -59,8 +60,8 @@ def run(cfg: DictConfig) -> dict[str, Any]:
             parameters=np.array(json.dumps(descriptor.parameters())),
             checksum=np.array(checksum(values)),
         )
-    n, columns = values.shape
-    print(f"{subject.given.name}: {counted(n, 'vertex')}, {counted(columns, 'column')} of {descriptor.name}: {out}")
+    (n, columns), preset = values.shape, HydraConfig.get().runtime.choices["descriptor"]
+    print(f"{subject.given.name}: {counted(n, 'vertex')}, {counted(columns, 'column')} of {preset}: {out}")
     return {"vertices": n, "columns": columns}
 
 

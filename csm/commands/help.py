@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from csm.commands.choices import BENCHES, config_folder, options_of
-from csm.commands.words import LISTS, WORDS
+from csm.commands.words import LISTS, OPTIONAL_WORDS, WORDS
 from csm.reproduction.registry import STUDIES, explained, listing
 from csm.reproduction.registry import options_of as options_of_study
 
@@ -30,7 +30,12 @@ SETTINGS = {
         "trainer.max_epochs=50": "how often all training shapes are gone through",
         "trainer.max_time=00:01:00:00": "days:hours:minutes:seconds after which it ends, whatever the epoch",
         "trainer.check_val_every_n_epoch=5": "epochs from one validation, and its printed numbers, to the next",
-    }
+    },
+    "evaluate": {
+        "data.root=FOLDER": "of the meshes, or of the data sets below which the set is; the built-in humans need none",
+        "data.test=[remeshed_5000]": "sets to test on, by their names; data.test_roots=[FOLDER] with data=folder",
+        "data.test_forms=[uneven_8000]": "also test on the first of these sets with other triangles",
+    },
 }
 """Commands -> settings of groups with several options that are changed most, each with an example, and what they do."""
 
@@ -91,7 +96,7 @@ def help_text(command: str, arguments: Sequence[str] = ()) -> str:
     page = read_page(command)
     options = {option[0]: option for option in page.options}.values()
     own = sorted(options, key=lambda option: option[0] in {key for key, *_ in read_page("common").options})
-    words = " ".join(f"[{key.upper()} ...]" if key in LISTS else key.upper() for key in WORDS.get(command, ()))
+    words = " ".join(_word(command, key) for key in WORDS.get(command, ()))
     lines = [f"usage: csm {command} {words} [key=value ...]".replace("  ", " "), ""]
     lines += [*textwrap.wrap(" ".join(page.purpose), _WIDTH), ""]
     named = studies_of(command)
@@ -115,7 +120,7 @@ def help_text(command: str, arguments: Sequence[str] = ()) -> str:
     groups = [row for row in page.groups if len(options_of(row[0])) > 1 and not row[0].startswith("hydra")]
     if groups:
         lines += ["", "groups, of which one option each is chosen as GROUP=OPTION:"]
-        lines += _table([(group, _choices(group, choice, text)) for group, choice, text in groups])
+        lines += _table([(group, _choices(command, group, choice, text)) for group, choice, text in groups])
         lines += ["", "An option has settings of its own, such as descriptor.k=20; --cfg job shows all of them."]
     lines += [
         "",
@@ -123,6 +128,12 @@ def help_text(command: str, arguments: Sequence[str] = ()) -> str:
         "debug=true shows the traceback of an error.",
     ]
     return "\n".join(lines)
+
+
+def _word(command: str, key: str) -> str:
+    """Return how the usage of a command shows a word: in brackets where it may be left out."""
+    word = f"{key.upper()} ..." if key in LISTS else key.upper()
+    return f"[{word}]" if key in LISTS or (command, key) in OPTIONAL_WORDS else word
 
 
 def studies_of(command: str) -> dict[str, str]:
@@ -150,8 +161,8 @@ def settings_of(group: str, choice: str) -> list[tuple[str, str, str]]:
     return [(option["key"], option["value"], option["words"] or "") for option in found if option]
 
 
-def _choices(group: str, choice: str, text: str) -> str:
-    names = [f"{name} (default)" if name == choice else name for name in options_of(group)]
+def _choices(command: str, group: str, choice: str, text: str) -> str:
+    names = [f"{name} (default)" if name == choice else name for name in options_of(group, command)]
     return ", ".join(names) + (f": {text}" if text else "")
 
 

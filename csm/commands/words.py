@@ -39,6 +39,9 @@ PATHS = frozenset(
 )
 """Keys whose values are paths, or lists of them."""
 
+OPTIONAL_WORDS = {("match", "out"), ("sweep-report", "out")}
+"""Commands and their words that may be left out; `LISTS` may be empty in any case."""
+
 _OPTIONAL = ("experiment", "recipe")  # groups that may be left out: null for no option
 _ALONE = {"-m", "--multirun", "-r", "--run", "--resolve", "--help", "-h", "--hydra-help", "--version"}
 _WITH_VALUE = {
@@ -88,7 +91,7 @@ def to_overrides(command: str, arguments: Sequence[str]) -> list[str]:
         elif _is_word(argument):
             words.append(argument)
         else:
-            overrides.append(_override(argument, sweeping))
+            overrides.append(_override(command, argument, sweeping))
     return [*flags, *_named(command, words), *filter(None, overrides), *options]
 
 
@@ -136,15 +139,31 @@ def _meant(word: str) -> str:
     return ""
 
 
-def _override(argument: str, sweeping: bool) -> str:
+def _override(command: str, argument: str, sweeping: bool) -> str:
     key, equals, value = argument.partition("=")
     if key in _OPTIONAL and value in ("", "null"):
         return ""
+    if key == "experiment":
+        _require_experiment_of(command, value)
     if key in PATHS and value not in ("", "null"):
         return f"{key}={_path_value(value, sweeping)}"
     if items := _assignments(value):
         return f"{key}=[{','.join(map(quoted, items))}]"
     return without_null(argument) if equals else argument
+
+
+def _require_experiment_of(command: str, value: str) -> None:
+    """Refuse a table of several rows where one training is wanted, and the other way round."""
+    from csm.commands.choices import is_table, options_of
+
+    for name in value.split(","):
+        if command in ("train", "prepare") and is_table(name):
+            raise ConfigError(f"experiment={name} is a table of several trainings: csm matrix experiment={name}")
+        if command == "matrix" and not is_table(name) and name in options_of("experiment"):
+            raise ConfigError(
+                f"experiment={name} is one training and no table: csm train experiment={name}; the tables are "
+                f"{', '.join(options_of('experiment', command))}"
+            )
 
 
 def _assignments(value: str) -> list[str]:

@@ -70,7 +70,9 @@ def recognise(folder: str | Path) -> FolderSet:
     if below:
         raise DataError(f"{root}: this is no set itself; did you mean {', '.join(below[:10])}?")
     known = ", ".join(layout.title for layout in layouts())
-    raise DataError(f"{root}: there are no meshes that csm can read; wanted one of: {known}")
+    plain = [str(path) for path in list_folders(root, 2) if _first(path, layouts())]
+    where = f"; there are some in {', '.join(plain[:10])}" if plain else ""
+    raise DataError(f"{root}: there are no meshes that csm can read{where}; wanted one of: {known}")
 
 
 def find_sets(folder: Path, depth: int = 4) -> list[FolderSet]:

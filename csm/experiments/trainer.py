@@ -14,6 +14,7 @@ from lightning.fabric.utilities.exceptions import MisconfigurationException
 from lightning.pytorch.callbacks import ModelCheckpoint
 from lightning.pytorch.loggers import CSVLogger, Logger, TensorBoardLogger
 
+from csm._extras import install_line
 from csm.errors import ConfigError
 from csm.experiments.callbacks import FiniteLoss, require_monitored
 from csm.experiments.history import History
@@ -72,9 +73,9 @@ def _make_logger(training: Training, folder: Path) -> Logger | bool:
                 _ = tried.experiment
         return training.logger(save_dir=folder)
     except ModuleNotFoundError as error:
-        raise ConfigError(
-            f"logger: a library is not installed ({error}); pip install it, or choose logger=csv"
-        ) from error
+        extra = next((name for name in ("wandb", "mlflow") if name in str(error)), "")
+        how = install_line(extra) if extra else "pip install it"
+        raise ConfigError(f"logger: a library is not installed; {how}, or choose logger=csv ({error})") from error
     except TypeError as error:
         raise ConfigError(f"logger: {error}") from error
 

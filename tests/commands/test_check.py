@@ -64,6 +64,13 @@ def test_files_are_checked_as_meshes_to_match(capsys):
     assert "1 of 2 meshes cannot be used" in error
 
 
+def test_an_empty_folder_is_answered_with_where_sets_are_published(tmp_path, capsys):
+    out, error = checked(capsys, tmp_path)
+    assert "no meshes that csm can read" in error
+    assert "MPI-FAUST: MPI-FAUST.zip" in out
+    assert "https://" in out
+
+
 def test_a_folder_of_unlike_meshes_needs_no_correspondence_to_be_matched(tmp_path, capsys):
     for n in (1, 2, 3):
         write_mesh(tmp_path / f"{n}.off", sphere(n))

@@ -42,7 +42,7 @@ def test_settings_of_data_and_trainer_that_are_named_exist_and_do_what_is_said()
 
 
 def test_words_without_a_key_are_in_the_usage():
-    assert help_text("match").startswith("usage: csm match SOURCE TARGET OUT [key=value ...]")
+    assert help_text("match").startswith("usage: csm match SOURCE TARGET [OUT] [key=value ...]")
     assert help_text("bench").startswith("usage: csm bench [TARGETS ...] [key=value ...]")
 
 

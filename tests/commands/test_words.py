@@ -87,6 +87,26 @@ def test_a_word_too_many_is_named(command, typed, said):
     assert said in str(refused.value)
 
 
+@pytest.mark.parametrize(
+    ("command", "typed", "said"),
+    [
+        ("train", "experiment=table4", "table of several trainings: csm matrix experiment=table4"),
+        ("prepare", "experiment=faust,lab", "csm matrix experiment=lab"),
+        (
+            "matrix",
+            "experiment=demo",
+            "is one training and no table: csm train experiment=demo; the tables are ablation",
+        ),
+    ],
+)
+def test_experiments_are_sent_to_the_command_that_runs_them(command, typed, said):
+    with pytest.raises(ConfigError) as refused:
+        to_overrides(command, [typed])
+    assert said in str(refused.value)
+    assert to_overrides("matrix", ["experiment=table4"]) == ["experiment=table4"]
+    assert to_overrides(command, ["experiment=of_my_own"]) == ["experiment=of_my_own"]
+
+
 def test_only_near_names_are_offered():
     assert nearest_names("adc", ["acd", "hks"]) == "; did you mean acd?"
     assert nearest_names("zzz", ["acd", "hks"]) == ""

@@ -10,8 +10,10 @@ from csm.data.folder import PLAIN, FolderDataModule
 from csm.data.registry import DATA_SETS, data_set, find_set, find_sets, layouts, recognise
 from csm.errors import DataError
 from csm.mesh.correspondence import ground_truth
+from csm.mesh.io import write_mesh
 from tests.data import layouts as made
 from tests.data.real import REAL
+from tests.shapes import sphere
 
 
 def test_a_data_set_is_known_by_its_name():
@@ -42,6 +44,9 @@ def test_folders_without_meshes_say_where_they_are(tmp_path):
     (tmp_path / "empty").mkdir()
     with pytest.raises(DataError, match="no meshes that csm can read; wanted one of: MPI-FAUST"):
         recognise(tmp_path / "empty")
+    write_mesh(tmp_path / "mine" / "below" / "a.off", sphere(1))
+    with pytest.raises(DataError, match=r"no meshes that csm can read; there are some in .*below; wanted"):
+        recognise(tmp_path / "mine")
     with pytest.raises(DataError, match="nowhere: there is no such folder"):
         recognise(tmp_path / "nowhere")
 

@@ -194,7 +194,7 @@ def test_a_logger_whose_library_is_missing_is_said_in_a_sentence(tmp_path):
         raise ModuleNotFoundError("No module named 'wandb'")
 
     with pytest.raises(
-        ConfigError, match=r"logger: a library is not installed \(No module named 'wandb'\); pip install"
+        ConfigError, match=r'logger: a library is not installed; pip install "csm-correspondence\[wandb\]"'
     ):
         fit(a_training(tmp_path, logger=missing), tmp_path / "run")
 

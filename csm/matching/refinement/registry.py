@@ -50,7 +50,8 @@ def refiner(name: str | Refiner | None) -> Refiner | None:
         return None
     if not isinstance(name, str) or name not in REFINERS:
         shown = repr(name) if isinstance(name, str) else f"a {type(name).__name__}"
-        raise ConfigError(f"refine={shown}; wanted {NONE}, {', '.join(list(REFINERS)[:-1])} or {list(REFINERS)[-1]}")
+        names = f"{NONE}, {', '.join(list(REFINERS)[:-1])} or {list(REFINERS)[-1]}"
+        raise ConfigError(f"refine={shown}; wanted {names}; a match of two meshes also takes auto")
     return REFINERS[name]()
 
 

@@ -39,7 +39,8 @@ def read_vts(path: str | os.PathLike[str], n_vertices: int) -> PointMap:
     Raises
     ------
     DataError
-        If the file is missing, is not a list of whole numbers, or names a vertex outside of 1..n_vertices.
+        If the file is missing, is not a list of whole numbers, or names a vertex outside of 1..n_vertices that is not
+        -1, which stands for a template point that the shape does not have.
     """
     return read_labels(path, direction=Direction.TEMPLATE_TO_SHAPE, base=1, n_to=n_vertices)
 
