@@ -51,7 +51,7 @@ def main() -> None:
                 begun = time.perf_counter()
                 (found,) = evaluate(method, shapes, protocol, store=store, workers=chosen.threads)
                 taken.append(time.perf_counter() - begun)
-            error = 1e3 * found.age
+            error = 1e3 * found.summary["age"]
             rows.append(Row(method, VERTICES, len(found.rows), error, statistics.median(taken), GOAL))
             print(f"{method}: {len(found.rows)} pairs, error {error:.1f}, {rows[-1].seconds:.0f} s")
     write("evaluation", chosen, {"points": POINTS}, rows)
