@@ -114,7 +114,6 @@ _ROWS = {
     "acd": "ACD alone",
     "acd_mgcn": "ACD + MGCN",
     "diffusionnet": "ACD + DiffusionNet",
-    "mgcn_coarse": "MGCN, trained at 1,000 vertices first",
     "acscnn_own_input": "ACSCNN on the input of csm's own network",
     "diffusionnet_own_input": "DiffusionNet on the input of csm's own network",
 }
