@@ -3,9 +3,9 @@
     python benchmarks/preparation.py --threads 2
 
 Each shape needs the eigensystems of csm's own setting of ACD and 256 functions of the isotropic Laplacian.  The
-reference computes one shape after the other on one thread, as `eigensystems.py` does, from assembled operators, and
-writes nothing; csm reads the operators from the mesh, and writes features and basis into an empty store.  `--threads`
-is the number of csm's processes, of one thread each.
+reference computes one shape after the other on one thread, as `eigensystems.py` does, with csm's own matrices, and
+writes nothing; csm writes features and basis into an empty store.  The first two of csm's eight shapes stand for all of
+them.  `--threads` is the number of csm's processes, of one thread each.
 """
 
 from __future__ import annotations

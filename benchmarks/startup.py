@@ -2,7 +2,7 @@
 
     python benchmarks/startup.py --repeats 5
 
-`--help` of every command, and a training with a misspelt option.
+`--help` of most commands.
 """
 
 from __future__ import annotations

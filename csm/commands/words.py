@@ -156,7 +156,7 @@ def _require_experiment_of(command: str, value: str) -> None:
     """Refuse a table of several rows where one training is wanted, and the other way round."""
     from csm.commands.choices import is_table, options_of
 
-    for name in value.split(","):
+    for name in (each.strip("'\" ") for each in value.split(",")):
         if command in ("train", "prepare") and is_table(name):
             raise ConfigError(f"experiment={name} is a table of several trainings: csm matrix experiment={name}")
         if command == "matrix" and not is_table(name) and name in options_of("experiment"):
@@ -209,7 +209,11 @@ def _path(word: str) -> str:
 
 
 def _each(values: str) -> Iterable[str]:
-    return (v if _is_quoted(v) else quoted(os.path.expanduser(v)) for v in map(str.strip, values.split(",")) if v)
+    return (
+        v if _is_quoted(v) or v == "null" else quoted(os.path.expanduser(v))
+        for v in map(str.strip, values.split(","))
+        if v
+    )
 
 
 def _is_quoted(value: str) -> bool:

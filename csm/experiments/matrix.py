@@ -145,6 +145,7 @@ class Matrix:
     def _fill_locked(self, row: Row) -> list[ResultRow]:
         known = require_same_training(self._place(row), row.identity)
         training = row.make()
+        _ = training.source  # read now: a wrong path must not be kept as how the row is trained
         if not known:
             self._require_same_network(row, training)
             keep_training(self._place(row), row.identity)

@@ -37,7 +37,7 @@ from csm.learning.places import template_of
 from csm.learning.pretrained import origin, require_same_trunk, take_over
 from csm.learning.samples import also_classes
 from csm.learning.twins import learn_twins
-from csm.matching.network import load_model
+from csm.matching.network import NetworkMethod, load_model
 
 _log = logging.getLogger(__name__)
 
@@ -213,6 +213,11 @@ def _interruptible() -> Iterator[None]:
             signal.signal(signal.SIGINT, handler)
 
 
+def weights_of(module: Describer) -> str:
+    """Return the hash of the weights of a network."""
+    return str(NetworkMethod(module).key["weights"])
+
+
 def make_module(
     training: Training, n_features: int, epochs: int | None = None, per_step: int | None = None
 ) -> CSMModule:
@@ -237,7 +242,11 @@ def make_module(
             "seed": training.seed,
             "epochs": epochs,
             **({} if per_step is None else {"shapes_per_step": per_step}),
-            **({} if training.source is None else {"pretrained": origin(training.source)}),
+            **(
+                {}
+                if training.source is None
+                else {"pretrained": origin(training.source) | {"weights": weights_of(training.source)}}
+            ),
             "command": made.command,
             "commit": made.commit,
         },

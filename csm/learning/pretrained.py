@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import torch
@@ -11,6 +12,7 @@ from csm.learning.describer import Describer
 from csm.learning.module import CSMModule
 
 _CLASSIFIER = "classifier."
+_FREE = {"dropout", "products", "momentum"}  # options of networks that weights can be trained on with
 
 
 def origin(source: Describer) -> dict[str, Any]:
@@ -36,7 +38,7 @@ def require_same_trunk(module: CSMModule, source: Describer, label: str) -> None
     ConfigError
         If their inputs or layers differ; the classifier and the classifiers of further templates may.
     """
-    wanted, given = module.settings["descriptor"], source.settings["descriptor"]
+    wanted, given = (json.loads(json.dumps(each.settings["descriptor"])) for each in (module, source))
     if wanted != given:
         differing = sorted(key for key in {*wanted, *given} if wanted.get(key) != given.get(key))
         raise ConfigError(
@@ -46,6 +48,12 @@ def require_same_trunk(module: CSMModule, source: Describer, label: str) -> None
     if (module.inputs is None) != (source.inputs is None):
         raise ConfigError(
             f"pretrained={label}: learning.standardise is {source.inputs is not None} there; it must be the same here"
+        )
+    model, other = (json.loads(json.dumps(each.settings["network"])) for each in (module, source))
+    if changed := sorted(k for k in {*model, *other} - _FREE if k in model and k in other and model[k] != other[k]):
+        raise ConfigError(
+            f"pretrained={label}: the model is another one (different: {', '.join(changed)}); choose the model that it "
+            "was trained with"
         )
     here, there = ({name: tuple(tensor.shape) for name, tensor in _trunk(each).items()} for each in (module, source))
     if differing := sorted(name for name in here.keys() | there.keys() if here.get(name) != there.get(name)):

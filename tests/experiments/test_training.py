@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from datetime import timedelta
 from functools import partial
 
@@ -214,14 +215,18 @@ def test_a_training_begins_with_the_weights_of_another(tmp_path):
     again = fit(still, tmp_path / "again").module
     for name, weights in first.module.network.named_parameters():
         torch.testing.assert_close(again.network.get_parameter(name), weights, rtol=0, atol=0)
-    assert again.hparams["training"]["pretrained"] == {"name": "toy", "set": "toys", "epochs": 2}
+    known = again.hparams["training"]["pretrained"]
+    assert {key: known[key] for key in ("name", "set", "epochs")} == {"name": "toy", "set": "toys", "epochs": 2}
+    other = fit(a_training(tmp_path, 2, seed=1), tmp_path / "other")
+    with pytest.raises(ConfigError, match=r"training\.pretrained\.weights"):
+        fit(replace(still, pretrained=str(other.checkpoint)), tmp_path / "again")
 
 
 def test_a_network_that_does_not_fit_is_refused_before_the_preparation(tmp_path, monkeypatch):
     first = fit(a_training(tmp_path), tmp_path / "first")
     monkeypatch.setattr(DataModule, "prepare", lambda data: pytest.fail("prepared"))
     wider = NETWORK | {"descriptor_channels": 32}
-    with pytest.raises(ConfigError, match="its layers are others"):
+    with pytest.raises(ConfigError, match="the model is another one"):
         fit(a_training(tmp_path, network=wider, pretrained=str(first.checkpoint)), tmp_path / "run")
     with pytest.raises(DataError, match="nowhere: there is no such checkpoint"):
         fit(a_training(tmp_path, pretrained="nowhere"), tmp_path / "run")
