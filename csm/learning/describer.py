@@ -14,6 +14,7 @@ from csm.errors import ConfigError
 from csm.learning.places import Places
 from csm.learning.samples import NetworkInput
 from csm.learning.sides import mended
+from csm.learning.smoothing import smoothed
 from csm.learning.standardisation import Standardisation
 from csm.learning.variation import Variation, image_columns
 from csm.mesh.shape import Mesh
@@ -21,6 +22,9 @@ from csm.networks import Surface, build, stencils_of
 
 FORMAT = 1
 """Version of the hyper-parameters in a checkpoint."""
+
+PLACES_VERSION = 2
+"""Of how places become a descriptor; raised where that changes, so that older results are not taken for new ones."""
 
 
 class Describer(nn.Module):
@@ -144,13 +148,19 @@ class Describer(nn.Module):
         given
             The shape.
         mesh
-            Its mesh, with which parts that are taken for their mirror images are mended (`csm.learning.sides`).
+            Its mesh, with which parts that are taken for their mirror images are mended (`csm.learning.sides`), and
+            the places of neighbours averaged (`csm.learning.smoothing`); without it neither is done.
         """
         if self.places is None:
             return last
-        classifier = self.network.classifier
+        found = self._placed(last, given, mesh)
+        return found if mesh is None else smoothed(found, mesh)
+
+    def _placed(self, last: Tensor, given: NetworkInput, mesh: Mesh | None) -> Tensor:
+        """Return the places of a shape as the network sees them vertex by vertex, rows of unit length."""
+        assert self.places is not None
         if not self.mirror or not self.places.has_twins:
-            plain: Tensor = self.places(last, classifier)
+            plain: Tensor = self.places(last, self.network.classifier)
             return plain
         image = self.last_layer(given._replace(features=self.mirrored(given.features)))
         rows = self._read(last, mesh, image=False) + self._read(image, mesh, image=True)

@@ -14,7 +14,7 @@ from csm._counts import counted
 from csm.data.prepare import Recipe, prepare_mesh
 from csm.data.store import Store
 from csm.learning.checkpoint import load_module
-from csm.learning.describer import Describer
+from csm.learning.describer import PLACES_VERSION, Describer
 from csm.learning.samples import network_input, recipe_of
 from csm.matching.base import Classifier, Described
 from csm.matching.methods import Method
@@ -53,7 +53,7 @@ class NetworkMethod(Method):
 
     @cached_property
     def key(self) -> Mapping[str, Any]:
-        """Network, input, and the hash of the weights."""
+        """Network, input, the hash of the weights, and how they describe a shape."""
         digest = hashlib.sha256()
         for name, tensor in sorted(self.module.state_dict().items()):
             if name.startswith("network.classifier.") and not self.module.has_classifier:
@@ -63,6 +63,8 @@ class NetworkMethod(Method):
             digest.update(name.encode() + tensor.detach().cpu().numpy().tobytes())
         hparams = self.module.settings
         plain = {name: hparams[name] for name in ("network", "descriptor", "basis_k")}
+        if self.module.places is not None:
+            plain["places"] = {"version": PLACES_VERSION, "mirror": bool(self.module.mirror)}
         return {**plain, "weights": digest.hexdigest()}
 
     @cached_property

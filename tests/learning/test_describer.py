@@ -9,6 +9,7 @@ from csm.errors import ConfigError
 from csm.learning.describer import Describer
 from csm.learning.loading import LightningData
 from csm.learning.samples import NetworkInput
+from csm.learning.smoothing import smoothed
 from tests.learning.toys import make_placed
 from tests.toyset import toy_datamodule
 
@@ -77,3 +78,10 @@ def test_parameters_that_do_not_fit_are_refused(options, message):
     settings = {"network": {"name": "csmcnn", "ks": 20}, "in_channels": 7, "n_classes": 50, "descriptor": {"name": "x"}}
     with pytest.raises(ConfigError, match=message):
         Describer.of(settings | options)
+
+
+def test_with_its_mesh_the_places_of_neighbours_are_averaged(module, given, loaded):
+    mesh = loaded.data.train_set.load(loaded.data.fit_names[1]).mesh
+    alone, found = module.describe(given), module.describe(given, mesh)
+    torch.testing.assert_close(found, smoothed(alone, mesh))
+    assert not torch.equal(found, alone)
