@@ -1,8 +1,8 @@
 """The tables of README.md and docs/, made from the json files under results/.
 
 ``make tables`` rewrites every block between ``<!-- study: FILE -->`` (what ``csm reproduce`` found),
-``<!-- benchmark: FILE -->`` (what a script of benchmarks/ measured) or ``<!-- headline -->`` (a few numbers of Tables 1
-and 4) and ``<!-- end -->``; a test compares them.
+``<!-- benchmark: FILE -->`` (what a script of benchmarks/ measured), ``<!-- headline -->`` (a few numbers of Tables 1
+and 4) or ``<!-- layouts -->`` (where data sets are published) and ``<!-- end -->``; a test compares them.
 """
 
 from __future__ import annotations
@@ -12,10 +12,11 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
+from csm.data.registry import layouts
 from csm.reproduction.study import Findings
 
 ROOT = Path(__file__).resolve().parent.parent
-BLOCK = re.compile(r"(<!-- (?:(study|benchmark): (\S+)|headline) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+BLOCK = re.compile(r"(<!-- (?:(study|benchmark): (\S+)|headline|layouts) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 MEASURED = {
     "work": ("", "{}"),
     "variant": ("", "{}"),
@@ -67,6 +68,13 @@ def headline() -> str:
     return "\n".join(lines) + "\n"
 
 
+def published() -> str:
+    """Return every form in which data sets are published, and where."""
+    origins = ((each.title, re.sub(r"(https?://[^\s,]+)", r"<\1>", each.origin)) for each in layouts())
+    rows = (f"| {title} | {origin} |" for title, origin in origins)
+    return "\n".join([*_head("what csm recognises", ["where it is published, and on what terms"]), *rows]) + "\n"
+
+
 def _refined(key: str, title: str) -> float:
     """Return the error on a set after the refinement that is the default of a match."""
     ending = "" if key == "faust" else f"_{key}"
@@ -112,8 +120,14 @@ def _written(key: str, value: object) -> str:
 
 def with_tables(text: str) -> str:
     """Return the text with every block made anew."""
-    make = {"study": study, "benchmark": benchmark}
-    return BLOCK.sub(lambda m: f"{m[1]}{make[m[2]](ROOT / m[3]) if m[2] else headline()}{m[5]}", text)
+    of_file = {"study": study, "benchmark": benchmark}
+
+    def filled(found: re.Match[str]) -> str:
+        begin, kind, path, _, end = found.groups()
+        made = of_file[kind](ROOT / path) if kind else published() if "layouts" in begin else headline()
+        return f"{begin}{made}{end}"
+
+    return BLOCK.sub(filled, text)
 
 
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))

@@ -16,7 +16,6 @@ import csm
 from csm.commands.choices import config_folder, options_of
 from csm.commands.help import read_page
 from csm.commands.main import COMMANDS
-from csm.data.registry import layouts
 
 if TYPE_CHECKING:
     from mkdocs.config.defaults import MkDocsConfig
@@ -48,15 +47,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, **_: object) -> str:
-    """Fill in the table of data sets where a page has its mark, and let links out of the folder stay on the site."""
-    markdown = markdown.replace("](../README.md)", "](index.md)").replace("](../CONTRIBUTING.md)", "](contributing.md)")
-    return re.sub(r"<!-- layouts:.*?-->", lambda _: layouts_table(), markdown)
-
-
-def layouts_table() -> str:
-    """Return every form in which data sets are published, and where."""
-    rows = ((layout.title, re.sub(r"(https?://[^\s,]+)", r"<\1>", layout.origin)) for layout in layouts())
-    return "\n".join(_table(("what csm recognises", "where it is published, and on what terms"), rows))
+    """Let links out of the folder stay on the site."""
+    return markdown.replace("](../README.md)", "](index.md)").replace("](../CONTRIBUTING.md)", "](contributing.md)")
 
 
 def made_pages() -> dict[str, str]:
