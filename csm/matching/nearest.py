@@ -76,7 +76,18 @@ def nearest(queries: Rows, candidates: Rows, *, at: IntArray | None = None, bloc
     if q.dtype != c.dtype:
         q, c = q.astype(np.float64), c.astype(np.float64)
     _require_finite(bool(np.isfinite(q).all() and np.isfinite(c).all()))
+    q, c = _of_usual_size(q, c)
     return _search(q, c, c.mean(0), max(1, min(block, _MAX_ELEMENTS // len(c))))
+
+
+def _of_usual_size(q: NDArray[Any], c: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the rows, both scaled by one power of two where their squares could overflow or vanish."""
+    largest = max(float(max(rows.max(initial=0), -rows.min(initial=0))) for rows in (q, c))
+    bound = float(np.finfo(c.dtype).max) ** 0.25
+    if largest == 0 or 1 / bound < largest < bound:
+        return q, c
+    exponent = -int(np.frexp(largest)[1])
+    return np.ldexp(q, exponent), np.ldexp(c, exponent)
 
 
 def _require_comparable(q: tuple[int, ...], c: tuple[int, ...]) -> None:

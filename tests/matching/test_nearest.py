@@ -116,6 +116,15 @@ def test_equal_rows_far_from_the_others_are_decided_without_them() -> None:
     np.testing.assert_array_equal(nearest(q, c), expected)
 
 
+@pytest.mark.parametrize(("dtype", "exponents"), [(np.float32, (-120, 126)), (np.float64, (-1000, 1020))])
+def test_the_size_of_the_numbers_decides_nothing(dtype: type, exponents: tuple[int, ...]) -> None:
+    rng = np.random.default_rng(5)
+    q, c = (rng.standard_normal((n, 4)).astype(dtype) for n in (30, 40))
+    expected = nearest(q, c)
+    for exponent in exponents:
+        np.testing.assert_array_equal(nearest(np.ldexp(q, exponent), np.ldexp(c, exponent)), expected)
+
+
 def test_only_the_vertices_asked_for() -> None:
     q, c = features(30, 5, 0), features(20, 5, 1)
     at = np.array([3, 17, 4])
