@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -42,10 +43,11 @@ class Attempt(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """Eigenvalues, ascending, and orthonormal eigenvectors."""
+    """Eigenvalues, ascending, and orthonormal eigenvectors; `residual` of pairs that have been checked."""
 
     evals: FloatArray  # (K,)
     evecs: FloatArray  # (N, K)
+    residual: float = float("nan")
 
 
 def attempts(problem: Problem) -> tuple[Attempt, ...]:
@@ -70,6 +72,7 @@ def attempt_once(problem: Problem, attempt: Attempt) -> tuple[Pairs | None, str]
     """Return the eigenpairs if they pass the checks, else None and what is wrong."""
     try:
         found = _solve(problem, attempt)
+        found = found._replace(residual=_residual(problem, found))
         fault = _fault(problem, found)
     except (RuntimeError, np.linalg.LinAlgError) as error:
         return None, str(error)
@@ -124,7 +127,7 @@ def _lanczos(operator: Callable[[FloatArray], FloatArray], n: int, k: int, below
     limit = min(6 * k + 40 * block, n - block) // block * block
     basis = np.empty((n, limit + block), order="F")  # unused columns take no memory
     reduced = np.zeros((limit + block, limit + block))  # the operator in the basis, lower half, block tridiagonal
-    basis[:, :block] = np.linalg.qr(np.random.default_rng(0).standard_normal((n, block)))[0]
+    basis[:, :block] = _start(n, block)
     look = (1.5 * k + 10) if below else (2.2 * k + 12 * block)  # where meshes are about to converge
     for size in range(block, limit + 1, block):
         _step(operator, basis[:, : size + block], reduced, block)
@@ -140,12 +143,18 @@ def _lanczos(operator: Callable[[FloatArray], FloatArray], n: int, k: int, below
     return Pairs(evals, basis[:, :size] @ mixing)
 
 
-def _ritz(reduced: FloatArray, block: int) -> Pairs:
+@lru_cache(maxsize=4)
+def _start(n: int, block: int) -> FloatArray:
+    """Return drawn orthonormal columns, the same for all angles of a mesh."""
+    return _orthonormal(np.random.default_rng(0).standard_normal((n, block)))[0]
+
+
+def _ritz(reduced: FloatArray, block: int) -> tuple[FloatArray, FloatArray]:
     """Return the pairs of the operator in the basis, of which `reduced` has the lower half."""
-    if block == 1:
-        evals, mixing = eigh_tridiagonal(reduced.diagonal(), reduced.diagonal(-1))
-        return Pairs(np.asarray(evals, np.float64), np.asarray(mixing, np.float64))
-    return Pairs(*np.linalg.eigh(reduced))
+    tridiagonal = block == 1
+    found = eigh_tridiagonal(reduced.diagonal(), reduced.diagonal(-1)) if tridiagonal else np.linalg.eigh(reduced)
+    evals, mixing = found
+    return np.asarray(evals, np.float64), np.asarray(mixing, np.float64)
 
 
 def _step(operator: Callable[[FloatArray], FloatArray], basis: FloatArray, reduced: FloatArray, block: int) -> None:
@@ -171,9 +180,8 @@ def _orthonormal(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def _fault(problem: Problem, found: Pairs) -> str:
     """Return what is wrong with the pairs, or an empty string."""
-    defect = residual(problem, found)
-    if not defect <= _RESIDUAL:
-        return f"the relative residual is {defect:.1e}, wanted at most {_RESIDUAL:.0e}"
+    if not found.residual <= _RESIDUAL:
+        return f"the relative residual is {found.residual:.1e}, wanted at most {_RESIDUAL:.0e}"
     error = np.abs(found.evecs.T @ found.evecs - np.eye(problem.k)).max()
     if not error <= _ORTHONORMAL:
         return f"the eigenvectors are orthonormal only to {error:.1e}"
@@ -181,7 +189,7 @@ def _fault(problem: Problem, found: Pairs) -> str:
     return counted(missing, "eigenvalue was passed over", "eigenvalues were passed over") if missing else ""
 
 
-def residual(problem: Problem, found: Pairs) -> float:
+def _residual(problem: Problem, found: Pairs) -> float:
     """Return the greatest defect of a pair over the greatest eigenvalue (over the unit if that is greater)."""
     defect = np.linalg.norm(problem.matrix @ found.evecs - found.evecs * found.evals, axis=0).max()
     return float(defect / max(found.evals[-1], problem.unit))

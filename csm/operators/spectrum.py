@@ -13,7 +13,7 @@ from threadpoolctl import ThreadpoolController
 from csm._counts import counted
 from csm._types import FloatArray
 from csm.errors import ConfigError, MeshError, NumericalError
-from csm.operators._eigensolver import Pairs, Problem, attempt_once, attempts, residual
+from csm.operators._eigensolver import Pairs, Problem, attempt_once, attempts
 from csm.operators._factors import Factors
 
 _log = logging.getLogger(__name__)
@@ -126,7 +126,7 @@ def eigenpairs(
         found, notes = _solved(problem, name)
         evals = np.where(found.evals < _ZERO * problem.unit, 0.0, found.evals)
         evecs = _with_fixed_signs(scale[:, None] * found.evecs)
-        return Spectrum(evals, evecs, mass, residual(problem, found), notes)
+        return Spectrum(evals, evecs, mass, found.residual, notes)
 
 
 def _solved(problem: Problem, name: str) -> tuple[Pairs, tuple[str, ...]]:
