@@ -227,8 +227,12 @@ def write_rows(path: str | os.PathLike[str], rows: Sequence[ResultRow]) -> None:
 
 
 def merge_rows(old: Iterable[ResultRow], new: Iterable[ResultRow]) -> list[ResultRow]:
-    """Return the old rows in their order, those with the key of a new row replaced by it, and the other new ones."""
-    return list({row.key: row for row in [*old, *new]}.values())
+    """Return the old rows in their order and the new ones; a row replaces those of its key whose seeds it has, too."""
+    groups: dict[Key, list[ResultRow]] = {}
+    for row in [*old, *new]:
+        others = [known for known in groups.get(row.key, []) if not set(known.seeds) <= set(row.seeds)]
+        groups[row.key] = [*others, row]
+    return [row for group in groups.values() for row in group]
 
 
 def add_rows(path: str | os.PathLike[str], rows: Sequence[ResultRow]) -> list[ResultRow]:

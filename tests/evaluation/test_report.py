@@ -74,6 +74,14 @@ def test_a_new_row_replaces_its_cell_and_keeps_the_order(tmp_path: Path) -> None
     assert add_rows(path, [better, c]) == read_rows(path) == [better, b, c]
 
 
+def test_rows_of_other_seeds_stay_and_their_mean_takes_their_place() -> None:
+    zero, one, both = (row(seeds=seeds) for seeds in ((0,), (1,), (0, 1)))
+    assert merge_rows([zero], [one]) == [zero, one]
+    assert merge_rows([zero, one], [row(seeds=(1,), age=0.5)]) == [zero, row(seeds=(1,), age=0.5)]
+    assert merge_rows([zero, one], [both]) == [both]
+    assert merge_rows([both], [one]) == [both, one]
+
+
 @pytest.mark.parametrize(
     ("field", "value"),
     [
