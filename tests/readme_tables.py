@@ -44,6 +44,7 @@ MEASURED = {
 UNTRAINED = {"acd": "ACD", "asmwd": "ASMWD, the next best of eleven families"}
 REFINED = "ACD, refined: the default of `csm match` [^1]"
 OWN = "csm's own network, `experiment=faust` [^2]"
+BEGUN = "the same, begun with the network that csm brings (`pretrained=humans`)"
 TRAINED = {"faust_paper": "CSMCNN", "faust_acscnn": "ACSCNN, the paper's best at 6,890"}
 
 
@@ -63,8 +64,9 @@ def headline() -> str:
     for name, title in TRAINED.items():
         (row,) = (row for row in table4["rows"] if row["row"] == name)
         lines.append(_line(title, [cell["age"] for cell in row["rows"] if _is_nearest(cell)]))
-    own = json.loads((ROOT / "results/own.json").read_text(encoding="utf-8"))
-    lines.append(_line(OWN, [row["age"] for row in own]))
+    for name, title in (("own", OWN), ("own_pretrained", BEGUN)):
+        rows = json.loads((ROOT / f"results/{name}.json").read_text(encoding="utf-8"))
+        lines.append(_line(title, [row["age"] for row in rows if row["train"] == "FAUST_6890"]))
     return "\n".join(lines) + "\n"
 
 
