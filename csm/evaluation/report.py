@@ -260,8 +260,7 @@ def write_curves_csv(path: str | os.PathLike[str], curves: Mapping[str, Evaluati
     """
     if not curves:
         raise DataError(f"{path}: there is no curve to write")
-    thresholds = next(iter(curves.values())).thresholds
-    columns = np.column_stack([thresholds, *(e.cqc for e in curves.values())])
+    columns = np.column_stack([next(iter(curves.values())).thresholds, *(e.cqc for e in curves.values())])
     _write_csv(path, ["threshold", *curves], [[f"{v:.6g}" for v in line] for line in columns])
 
 
@@ -291,9 +290,7 @@ def _between(value: float | None, low: float, high: float) -> bool:
 
 
 def _cell(value: Any) -> str:
-    if isinstance(value, tuple):
-        return " ".join(map(str, value))
-    return "" if value is None else str(value)
+    return "" if value is None else " ".join(map(str, value)) if isinstance(value, tuple) else str(value)
 
 
 def _write_csv(path: str | os.PathLike[str], header: Sequence[str], lines: Iterable[Sequence[str]]) -> None:

@@ -12,15 +12,15 @@ from collections.abc import Callable
 import numpy as np
 import torch
 from scipy import sparse
-from scipy.sparse.linalg import splu
 from torch import Tensor
 from torch.nn import functional
 
 from csm._types import BoolArray, FloatArray
 from csm.learning.places import Reading
+from csm.learning.smoothing import diffusion
 from csm.mesh.shape import Mesh
 from csm.mesh.topology import components, edge_graph
-from csm.operators.laplacian import stiffness, vertex_areas
+from csm.operators.laplacian import vertex_areas
 
 SPREAD = 0.003
 """Time of the diffusion over which turns are averaged, in units of the area: a scale of a twentieth of its root."""
@@ -110,8 +110,7 @@ class _Shape:
         corners, weights = self.mesh.faces.ravel(), np.repeat(self.mesh.face_areas, 3)
         known = np.repeat(turns, 3), np.repeat(np.abs(turns), 3)
         given = [np.bincount(corners, weights * values, self.mesh.n_vertices) for values in known]
-        mass = sparse.diags_array(np.maximum(self.areas, 1e-12 * self.area))
-        solve = splu(sparse.csc_array(mass + SPREAD * self.area * stiffness(self.mesh))).solve
+        _, solve = diffusion(self.mesh, SPREAD)
         total, count = (solve(values) for values in given)
         enough = count > 1e-6 * count.max()
         return np.where(enough, total / np.where(enough, count, 1), 1.0)

@@ -13,13 +13,18 @@ eigenpairs.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 from torch import Tensor
 from torch.nn import functional
 
+from csm._types import FloatArray
 from csm.mesh.shape import Mesh
 from csm.operators.laplacian import stiffness, vertex_areas
 
@@ -27,6 +32,22 @@ TIME = 3e-4
 """t in units of the area of the shape: what is finer than a fiftieth of the root of the area is averaged."""
 
 _BLOCK = 64  # columns at a time, which bounds the memory
+
+
+def diffusion(mesh: Mesh, time: complex) -> tuple[FloatArray, Callable[[NDArray[Any]], NDArray[Any]]]:
+    """Return the vertex areas A, shape (N,), and what solves  (A + time S) x = b  with the stiffness S.
+
+    Parameters
+    ----------
+    mesh
+        The shape; a vertex without faces counts as one of very little area.
+    time
+        In units of the area of the shape; imaginary for the low-pass of this module.
+    """
+    areas = vertex_areas(mesh)
+    area = float(areas.sum())
+    areas = np.maximum(areas, 1e-12 * area)
+    return areas, splu(sparse.csc_array(sparse.diags_array(areas) + time * area * stiffness(mesh))).solve
 
 
 def smoothed(rows: Tensor, mesh: Mesh) -> Tensor:
@@ -52,11 +73,8 @@ def smoothed(rows: Tensor, mesh: Mesh) -> Tensor:
     >>> torch.allclose(smoothed(alike, mesh), alike, atol=1e-5)
     True
     """
-    areas = vertex_areas(mesh)
-    area = float(areas.sum())
-    mass = np.maximum(areas, 1e-12 * area)
-    solve = splu(sparse.csc_array(sparse.diags_array(mass) + 1j * TIME * area * stiffness(mesh))).solve
-    given = mass[:, None] * rows.double().cpu().numpy()
+    areas, solve = diffusion(mesh, 1j * TIME)
+    given = areas[:, None] * rows.double().cpu().numpy()
     for begin in range(0, given.shape[1], _BLOCK):
         given[:, begin : begin + _BLOCK] = solve(given[:, begin : begin + _BLOCK].astype(complex)).real
     return functional.normalize(torch.from_numpy(given).to(rows), dim=1)
