@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -127,7 +126,7 @@ def _lanczos(operator: Callable[[FloatArray], FloatArray], n: int, k: int, below
     limit = min(6 * k + 40 * block, n - block) // block * block
     basis = np.empty((n, limit + block), order="F")  # unused columns take no memory
     reduced = np.zeros((limit + block, limit + block))  # the operator in the basis, lower half, block tridiagonal
-    basis[:, :block] = _start(n, block)
+    basis[:, :block] = _orthonormal(np.random.default_rng(0).standard_normal((n, block)))[0]
     look = (1.5 * k + 10) if below else (2.2 * k + 12 * block)  # where meshes are about to converge
     for size in range(block, limit + 1, block):
         _step(operator, basis[:, : size + block], reduced, block)
@@ -143,17 +142,12 @@ def _lanczos(operator: Callable[[FloatArray], FloatArray], n: int, k: int, below
     return Pairs(evals, basis[:, :size] @ mixing)
 
 
-@lru_cache(maxsize=4)
-def _start(n: int, block: int) -> FloatArray:
-    """Return drawn orthonormal columns, the same for all angles of a mesh."""
-    return _orthonormal(np.random.default_rng(0).standard_normal((n, block)))[0]
-
-
 def _ritz(reduced: FloatArray, block: int) -> tuple[FloatArray, FloatArray]:
     """Return the pairs of the operator in the basis, of which `reduced` has the lower half."""
     tridiagonal = block == 1
-    found = eigh_tridiagonal(reduced.diagonal(), reduced.diagonal(-1)) if tridiagonal else np.linalg.eigh(reduced)
-    evals, mixing = found
+    evals, mixing = (
+        eigh_tridiagonal(reduced.diagonal(), reduced.diagonal(-1)) if tridiagonal else np.linalg.eigh(reduced)
+    )
     return np.asarray(evals, np.float64), np.asarray(mixing, np.float64)
 
 
