@@ -49,6 +49,12 @@ def test_the_front_page_leads_to_pages_of_the_site(pages):
     assert [link for link in links if link not in known] == []
 
 
+def test_data_sets_are_listed_where_the_page_asks_for_them(pages):
+    text = pages.on_page_markdown((ROOT / "docs" / "data.md").read_text(encoding="utf-8"))
+    assert "<!-- layouts -->\n" in text
+    assert "| MPI-FAUST | MPI-FAUST.zip from <http://faust.is.tue.mpg.de> (registration" in text
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(importlib.util.find_spec("mkdocs") is None, reason='needs pip install "csm-correspondence[docs]"')
 def test_the_site_builds_without_a_warning(tmp_path):

@@ -87,6 +87,13 @@ class Training:
         """The trained network that it begins with."""
         return None if self.pretrained is None else load_model(self.pretrained).module
 
+    @cached_property
+    def begun(self) -> dict[str, Any]:
+        """What the checkpoint says of that network, with the hash of its weights; empty without one."""
+        if self.source is None:
+            return {}
+        return {"pretrained": origin(self.source) | {"weights": NetworkMethod(self.source).key["weights"]}}
+
 
 @dataclass(frozen=True, eq=False)
 class Trained:
@@ -213,11 +220,6 @@ def _interruptible() -> Iterator[None]:
             signal.signal(signal.SIGINT, handler)
 
 
-def weights_of(module: Describer) -> str:
-    """Return the hash of the weights of a network."""
-    return str(NetworkMethod(module).key["weights"])
-
-
 def make_module(
     training: Training, n_features: int, epochs: int | None = None, per_step: int | None = None
 ) -> CSMModule:
@@ -242,11 +244,7 @@ def make_module(
             "seed": training.seed,
             "epochs": epochs,
             **({} if per_step is None else {"shapes_per_step": per_step}),
-            **(
-                {}
-                if training.source is None
-                else {"pretrained": origin(training.source) | {"weights": weights_of(training.source)}}
-            ),
+            **training.begun,
             "command": made.command,
             "commit": made.commit,
         },

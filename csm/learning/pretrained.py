@@ -38,7 +38,7 @@ def require_same_trunk(module: CSMModule, source: Describer, label: str) -> None
     ConfigError
         If their inputs or layers differ; the classifier and the classifiers of further templates may.
     """
-    wanted, given = (json.loads(json.dumps(each.settings["descriptor"])) for each in (module, source))
+    wanted, given = (_plain(each, "descriptor") for each in (module, source))
     if wanted != given:
         differing = sorted(key for key in {*wanted, *given} if wanted.get(key) != given.get(key))
         raise ConfigError(
@@ -49,8 +49,8 @@ def require_same_trunk(module: CSMModule, source: Describer, label: str) -> None
         raise ConfigError(
             f"pretrained={label}: learning.standardise is {source.inputs is not None} there; it must be the same here"
         )
-    model, other = (json.loads(json.dumps(each.settings["network"])) for each in (module, source))
-    if changed := sorted(k for k in {*model, *other} - _FREE if k in model and k in other and model[k] != other[k]):
+    model, other = (_plain(each, "network") for each in (module, source))
+    if changed := sorted(key for key in (model.keys() & other.keys()) - _FREE if model[key] != other[key]):
         raise ConfigError(
             f"pretrained={label}: the model is another one (different: {', '.join(changed)}); choose the model that it "
             "was trained with"
@@ -83,6 +83,12 @@ def take_over(module: CSMModule, source: Describer) -> bool:
         for name, tensor in weights.items():
             own[name].copy_(tensor)
     return bool(same)
+
+
+def _plain(module: Describer, part: str) -> dict[str, Any]:
+    """Return a part of the settings as json has it, where a tuple is a list."""
+    found: dict[str, Any] = json.loads(json.dumps(module.settings[part]))
+    return found
 
 
 def _trunk(module: Describer) -> dict[str, torch.Tensor]:
