@@ -55,7 +55,7 @@ class Trusting(Refiner):
     """
 
     returning: float = 0.985
-    doubtful: float = 1.0
+    doubtful: float = 1.1
     mostly: float = 0.8
     joint: Joint = field(default_factory=Joint)
     search: Multistart = field(default_factory=Multistart)
