@@ -28,6 +28,9 @@ NAMES = tuple(f"tr_reg_{i:03d}" for i in range(100))
 REFINED = (8000, 10000, 12000, 15000)
 """Vertices of the resolutions of LPS-data."""
 
+REMESHED = 5000
+"""About as many vertices have the bodies with other triangles."""
+
 SPLIT = Split(
     "faust_80_20", NAMES[:80], NAMES[80:], "The paper, section 5: the first 80 registrations train, the last 20 test"
 )
@@ -120,12 +123,12 @@ class FaustDataModule(DataModule):
     Parameters
     ----------
     root
-        Folder with FAUST_6890 (the ACD release) or MPI-FAUST, and those of FAUST_8000 ... FAUST_15000 that are used;
-        None for the environment variable `CSM_DATA`, else the folder `data`.
+        Folder with FAUST_6890 (the ACD release) or MPI-FAUST, and those of FAUST_8000 ... FAUST_15000 and
+        FAUST_5k_remeshed that are used; None for the environment variable `CSM_DATA`, else the folder `data`.
     train
         Resolution to train on.
     test
-        Resolutions to test on.
+        Resolutions to test on; 5000 are the bodies with other triangles throughout (SGA18/BCICP).
     split
         A split, its name, or the path of a split file.
     options
@@ -152,7 +155,8 @@ def names_of(n_vertices: int) -> tuple[str, ...]:
     >>> names_of(6890), names_of(10000)
     (('FAUST_6890', 'FAUST_MPI'), ('FAUST_10000',))
     """
-    return ("FAUST_6890", "FAUST_MPI") if n_vertices == N_VERTICES else (f"FAUST_{n_vertices}",)
+    others = {N_VERTICES: ("FAUST_6890", "FAUST_MPI"), REMESHED: ("FAUST_5k_remeshed",)}
+    return others.get(n_vertices, (f"FAUST_{n_vertices}",))
 
 
 DATA_SET = DataSet(FaustDataModule, (MPI, RELEASE, SGA18, LPS), (SPLIT, HELD_OUT))

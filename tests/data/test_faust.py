@@ -50,7 +50,7 @@ def test_a_decimated_registration_is_refused(tmp_path):
 
 
 def test_acd_release_of_faust_names_missing_labels(tmp_path):
-    layouts.acd(tmp_path, ("tr_reg_000", "tr_reg_001"))
+    layouts.acd(tmp_path, ("tr_reg_000", "tr_reg_001", "tr_reg_002"))
     (tmp_path / "labels" / "tr_reg_001.mat").unlink()
     shapes = recognise(tmp_path)
     assert shapes.layout is RELEASE
@@ -121,6 +121,13 @@ def test_the_published_split_fits_all_its_training_shapes_and_says_so(tmp_path):
     assert (data.fit_names, data.validates_unseen) == (SPLIT.train, False)
     assert "validated on the last 10 training shapes, which are also fitted" in data.protocol
     assert FaustDataModule(layouts.mpi_faust(tmp_path), test=(6890,), holdout=10, **CHEAP).validates_unseen
+
+
+def test_bodies_with_other_triangles_are_tested_on_beside_those_that_are_fitted(tmp_path):
+    layouts.mpi_faust(tmp_path / "FAUST_MPI")
+    layouts.sga18(tmp_path / "FAUST_5k_remeshed", ("tr_reg_000", "tr_reg_001", "tr_reg_002"))
+    data = FaustDataModule(tmp_path, test=(6890, 5000), **CHEAP)
+    assert list(data.test_sets) == ["FAUST_MPI", "FAUST_5k_remeshed"]
 
 
 @pytest.mark.data
