@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,7 +24,29 @@ FAR = 0.15
 """How far points in faces may be from such a partner, in the same units: a tenth of a human's geodesic diameter."""
 
 
-def anchored(done: RefinedMap, source: Described, target: Described) -> RefinedMap:
+class BothWays(NamedTuple):
+    """Maps between two shapes, source -> target and target -> source."""
+
+    there: VertexMap
+    back: VertexMap
+
+
+def nearest_both_ways(source: Described, target: Described) -> BothWays:
+    """Return the nearest neighbours of both shapes in each other."""
+    return BothWays(_nearest(source, target), _nearest(target, source))
+
+
+def astray(ways: BothWays, source: Described, target: Described) -> float:
+    """Return how far vertices are from where they return, on average over both shapes, counted up to `SURE`.
+
+    Of two maps of one pair the better one mostly has less, where none has parts that are far off.
+    """
+    there = there_and_back(ways.there, ways.back, source.mesh)
+    back = there_and_back(ways.back, ways.there, target.mesh)
+    return float(sum(np.minimum(distance, SURE).mean() for distance in (there, back)) / 2)
+
+
+def anchored(done: RefinedMap, source: Described, target: Described, nearest: BothWays) -> RefinedMap:
     """Return a refined map in which vertices whose nearest neighbours return have these for partners.
 
     What is refined then is the rest: vertices that the descriptor is not sure of.  Functional maps know shapes by their
@@ -31,7 +54,7 @@ def anchored(done: RefinedMap, source: Described, target: Described) -> RefinedM
     a place that no descriptor speaks for.  The map into faces stays the refined one, which is smooth, but where that is
     far from the partner.  A functional map stays as it was: it is too coarse to tell the difference.
     """
-    there, back = _nearest(source, target), _nearest(target, source)
+    there, back = nearest
     backward = None if done.backward is None else _kept(done.backward, target, source, back, there)
     return replace(done, forward=_kept(done.forward, source, target, there, back), backward=backward)
 

@@ -4,7 +4,9 @@ A network that knows the shapes gives a map that no search improves, and a searc
 shapes that it does not know it exchanges limbs as a descriptor does, and only a search mends that.  Which of the two it
 is shows without ground truth: where nearest neighbours are right they return to their place on the way there and back.
 In a start that is trusted, those that do so keep their partners, and the refinement finds some for the others
-(`csm.matching.refinement.anchors`): it is hardly ever worse than the start.
+(`csm.matching.refinement.anchors`): it is hardly ever worse than the start.  Only where the vertices of the refined map
+return nearer to their place than those of the start, as they do on bodies that the network knows little, it is taken
+whole.
 
 A search knows a map by how nearly it keeps areas, lengths and the descriptor.  Where the two bodies differ so much that
 even the best map keeps them badly, these say little, and a start of which most returns is the better guess.
@@ -19,7 +21,7 @@ from csm.errors import ConfigError
 from csm.matching.base import Described
 from csm.matching.confidence import returning
 from csm.matching.maps import VertexMap
-from csm.matching.refinement.anchors import anchored
+from csm.matching.refinement.anchors import BothWays, anchored, astray, nearest_both_ways
 from csm.matching.refinement.base import RefinedMap, Refiner
 from csm.matching.refinement.joint import Joint
 from csm.matching.refinement.multistart import Multistart
@@ -78,5 +80,10 @@ class Trusting(Refiner):
                 f"{said}searched for, but the best of the search keeps areas, lengths and the descriptor badly "
                 f"({found.misfit:.2f} in sum), so the start was "
             )
-        kept = anchored(self.joint(start, source, target), source, target)
+        nearest, done = nearest_both_ways(source, target), self.joint(start, source, target)
+        if share >= self.returning and done.backward is not None:
+            refined = BothWays(done.forward.vertex_map, done.backward.vertex_map)
+            if astray(refined, source, target) < astray(nearest, source, target):
+                return replace(done, text=f"{said}refined throughout: {done.text}")
+        kept = anchored(done, source, target, nearest)
         return replace(kept, text=f"{said}kept: {kept.text}")

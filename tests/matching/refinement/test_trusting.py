@@ -67,6 +67,18 @@ def test_a_search_that_ends_badly_is_believed_only_where_little_returns(pair, mo
     assert ("badly (1.20 in sum), so the start was kept" in found.text) == (chosen == "joint")
 
 
+@pytest.mark.parametrize(("n_astray", "said"), [(10, "kept"), (0, "refined throughout")])
+def test_a_refined_map_that_returns_better_than_the_start_is_taken_whole(pair, monkeypatch, n_astray, said):
+    indices = np.arange(162)
+    indices[:n_astray] = 161 - indices[:n_astray]
+    way, back = Way(VertexMap(indices, 162)), Way(VertexMap(np.arange(162), 162))
+    monkeypatch.setattr(Joint, "__call__", lambda *_: RefinedMap(way, back, "joint"))
+    there = noisy(pair[1], 0.03)
+    found = Trusting(returning=0.9)(way.vertex_map, pair[0], there)
+    assert f"the start was {said}: joint" in found.text
+    assert (found.forward is way) == (said == "refined throughout")
+
+
 @pytest.mark.parametrize("share", [-0.1, 1.1, float("nan")])
 def test_a_share_is_between_0_and_1(share):
     for parameter in ("returning", "mostly"):
