@@ -64,7 +64,7 @@ def _written(name: str, tensor: Tensor, half: bool) -> Tensor:
 
 
 def load_module(path: str | os.PathLike[str]) -> Describer:
-    """Load a trained network: a Lightning checkpoint of ``csm train``, or the json file of an export.
+    """Load a trained network: a Lightning checkpoint of ``csm train``, or an export, by either of its files.
 
     Nothing in the files is executed, and no configuration is needed.
 
@@ -76,6 +76,8 @@ def load_module(path: str | os.PathLike[str]) -> Describer:
     if not isinstance(path, str | os.PathLike):
         raise ConfigError(f"a checkpoint is given by its path, got a {type(path).__name__}")
     path = Path(path)
+    if path.name == WEIGHTS:  # the settings beside the weights say what they are of
+        path = path.with_name(SETTINGS)
     if not path.is_file():
         raise DataError(
             f"{path}: there is no such checkpoint; csm train writes model.ckpt into its output folder, and csm brings "
