@@ -20,7 +20,7 @@ from csm._counts import counted
 from csm.commands.app import command
 from csm.data.folders import FolderSet, Missing, SameFaces
 from csm.data.inspection import Inspected, inspect
-from csm.data.registry import layouts, recognise
+from csm.data.registry import find_sets, layouts, recognise
 from csm.errors import ConfigError, CsmError, DataError
 from csm.matching.subjects import subject_of
 from csm.mesh.check import Finding, require_usable
@@ -65,6 +65,8 @@ def run(cfg: DictConfig) -> dict[str, Any]:
         try:
             report = check_folder(paths[0])
         except DataError as error:
+            if cfg.use != "train" and (below := find_sets(paths[0])):
+                return _list(below)
             if cfg.use == "train" or not list_files(paths[0], *READABLE):
                 print("\n".join(_known_sets()))
                 raise
@@ -74,6 +76,15 @@ def run(cfg: DictConfig) -> dict[str, Any]:
             return _conclude(report, paths[0])
         print("The meshes differ in their triangles and there are no maps, so each is checked as one to match.\n")
     return check_files(paths)
+
+
+def _list(sets: Sequence[FolderSet]) -> dict[str, Any]:
+    """Print the sets below a folder, and how to check one of them."""
+    for each in sets:
+        gone = f", {counted(len(each.missing), 'file is', 'files are')} missing" if each.missing else ""
+        print(f"{each.name}: {counted(len(each.names), 'shape')} ({each.layout.title}) in {each.root}{gone}")
+    print(f"\n{counted(len(sets), 'set')}; csm check {sets[0].root} checks the meshes of one")
+    return {"sets": len(sets)}
 
 
 def _conclude(report: Report, folder: Path) -> dict[str, Any]:

@@ -27,7 +27,9 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     from csm.matching.network import load_model
 
     if cfg.checkpoint is None:
-        raise ConfigError("evaluate needs checkpoint=PATH, a .ckpt that csm train wrote")
+        raise ConfigError(
+            "evaluate needs checkpoint=PATH, a .ckpt that csm train wrote, or checkpoint=humans, which csm brings"
+        )
     method = load_model(cfg.checkpoint)
     data, protocol, matching = make_data(cfg, method.recipe), make_protocol(cfg), matching_of(cfg)
     require_results(cfg.results)

@@ -49,6 +49,9 @@ def train(cfg: DictConfig) -> dict[str, Any] | None:
         tests = counted(len(training.data.split.test), "test shape")
         begins = f"; begins with the weights of {training.pretrained}" if training.pretrained else ""
         print(f"{training.name}: {training.data.protocol}; {tests}{begins}", flush=True)
+        every, epochs = cfg.trainer.check_val_every_n_epoch, cfg.trainer.max_epochs
+        if every and epochs and 0 < epochs < every:
+            print(f"no validation in {counted(epochs, 'epoch')}: trainer.check_val_every_n_epoch={every}", flush=True)
     trained = fit(training, folder, cfg.resume)
     if HydraConfig.get().mode == RunMode.RUN:  # the jobs of a sweep that torchrun started go on together
         part()

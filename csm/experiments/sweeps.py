@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import re
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -25,6 +26,7 @@ MEAN_ERROR = "mean test error"
 _RESULT = "result.json"
 _SHOWN = ("status", "seconds", "train/loss", "val/age", "fit/age")
 _SEED = "seed"
+_QUOTED = re.compile(r"^(data\.root|data\.split|pretrained)=(['\"])([\w./-]+)\2$")
 _MARK = "Made by csm sweep-report."
 
 
@@ -223,7 +225,8 @@ def _best_in_words(ranked: Sequence[SweepJob], quantity: str) -> str:
     text = f"Job {best.name} has {quantity} {best.value(quantity):.4g}."
     if len(ranked) > 1:
         middle = ranked[len(ranked) // 2]
-        text += f" The next has {ranked[1].value(quantity):.4g}, the middle one {middle.value(quantity):.4g}."
+        text += f" The next has {ranked[1].value(quantity):.4g}"
+        text += f", the middle one {middle.value(quantity):.4g}." if middle is not ranked[1] else "."
     seeds = {job.settings.get(_SEED) for job in ranked}
     if len(seeds) < 2:
         text += " With one seed, a small difference may be chance: repeat the best ones with seed=0,1,2."
@@ -231,7 +234,9 @@ def _best_in_words(ranked: Sequence[SweepJob], quantity: str) -> str:
 
 
 def _command(job: SweepJob) -> str:
-    return " ".join(["csm train", *map(shlex.quote, job.overrides)])
+    """Return what to type; csm puts a path in quotes itself, so those of a plain one are left out."""
+    typed = (_QUOTED.sub(r"\1=\3", override) for override in job.overrides)
+    return " ".join(["csm train", *map(shlex.quote, typed)])
 
 
 def _table(jobs: Sequence[SweepJob], quantity: str) -> Table:
@@ -268,7 +273,8 @@ def _effects(ranked: Sequence[SweepJob], quantity: str) -> list[Section]:
         spread: FloatArray = np.array(
             [float(np.std(group)) / max(1, len(group) - 1) ** 0.5 for group in groups.values()]
         )
-        sweeps.append(Sweep(name, list(groups), {quantity: (means, spread)}, ranked[0].settings.get(name, "")))
+        best = ranked[0].settings.get(name, "")
+        sweeps.append(Sweep(name, list(groups), {quantity: (means, spread)}, best, ring="best job"))
     rows = [[name, f"{100 * share:.0f} %"] for name, share in shares.items()]
     return [
         Section(

@@ -7,6 +7,8 @@ from typing import Any
 
 import torch
 
+from csm.descriptors.base import record
+from csm.descriptors.presets import PRESETS
 from csm.errors import ConfigError
 from csm.learning.describer import Describer
 from csm.learning.module import CSMModule
@@ -43,7 +45,7 @@ def require_same_trunk(module: CSMModule, source: Describer, label: str) -> None
         differing = sorted(key for key in {*wanted, *given} if wanted.get(key) != given.get(key))
         raise ConfigError(
             f"pretrained={label}: its input is another descriptor ({given['name']}; different: "
-            f"{', '.join(differing)}); give the training the descriptor of that network"
+            f"{', '.join(differing)}); {_wanted(given)}"
         )
     if (module.inputs is None) != (source.inputs is None):
         raise ConfigError(
@@ -83,6 +85,15 @@ def take_over(module: CSMModule, source: Describer) -> bool:
         for name, tensor in weights.items():
             own[name].copy_(tensor)
     return bool(same)
+
+
+def _wanted(given: dict[str, Any]) -> str:
+    """Say which descriptor a training has to take, by its preset if it is one."""
+    known = (name for name, descriptor in PRESETS.items() if json.loads(json.dumps(record(descriptor))) == given)
+    name = next(known, None)
+    if name is None:
+        return "give the training the descriptor of that network"
+    return f"wanted descriptor={name}, or a recipe that has it: recipe=own has that of the network humans"
 
 
 def _plain(module: Describer, part: str) -> dict[str, Any]:

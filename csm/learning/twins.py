@@ -60,8 +60,10 @@ def learn_twins(module: Describer, samples: Sequence[ShapeSample]) -> bool:
     if agreed < AGREED:
         LOG.info(
             "learning.mirror: with left and right exchanged, %.0f %% of the points of mirror images are where they "
-            "belong, so the template's two sides do not match; shapes are described without their mirror images",
+            "belong, fewer than %.0f %%: the network is too little trained, or the template's two sides do not match; "
+            "shapes are described without their mirror images",
             100 * agreed,
+            100 * AGREED,
         )
         return False
     places.twins.copy_(twins)

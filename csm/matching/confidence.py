@@ -74,7 +74,11 @@ class Confidence:
         """Say how much of the source has a trustworthy partner."""
         if self.trusted >= 0.9:
             share = "all" if self.trusted == 1 else f"{np.floor(100 * self.trusted):.0f} %"
-            return f"{share} of the source has a trustworthy partner (a confidence of {TRUSTED:g} or more)"
+            right = np.floor(100 * self.values.mean())
+            wrong = (
+                "" if right >= 98 else f", of which about one in {1 / (1 - self.values.mean()):.0f} may still be wrong"
+            )
+            return f"{share} of the source has a trustworthy partner (a confidence of {TRUSTED:g} or more){wrong}"
         share = _in_words(1 - self.trusted)
         if self.trusted >= 0.6:
             return (

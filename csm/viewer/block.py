@@ -70,8 +70,10 @@ def _buttons(viewer: Viewer) -> str:
 
 
 def _scales(viewer: Viewer) -> str:
+    reference = escape(viewer.panels[viewer.reference].title)
     said = {
-        "matched": "Mapped vertices have the same colour. Orange to blue: left to right; dark to light: bottom to top.",
+        "matched": f"Mapped vertices have the same colour. Orange to blue: left to right of {reference} in the front "
+        "view; dark to light: its bottom to top.",
         "checker": "A checkerboard on the mesh that is mapped to, pulled through the map: torn where the map is torn.",
         "stripes": "Slanted stripes pulled through the map; they slant the other way where left and right are swapped.",
         "plain": "The shape alone.",

@@ -116,12 +116,15 @@ class Sweep:
         sweeps of a figure have the same names.
     preset
         The value that the other sweeps hold this parameter at; marked if it is among the values.
+    ring
+        What the legend calls that mark.
     """
 
     label: str
     values: Sequence[float | str]
     lines: Mapping[str, tuple[FloatArray, FloatArray]]
     preset: float | str
+    ring: str = "preset"
 
 
 def sweeps_figure(sweeps: Sequence[Sweep], quantity: str) -> Figure:
@@ -143,7 +146,7 @@ def sweeps_figure(sweeps: Sequence[Sweep], quantity: str) -> Figure:
         for k, (name, (means, spread)) in enumerate(sweep.lines.items()):
             label = name if len(sweep.lines) > 1 else None
             axes.errorbar(place, means, spread, color=CYCLE[k], marker="o", ms=4, capsize=2.5, lw=1.4, label=label)
-            ring = "preset" if k == len(sweep.lines) - 1 else None
+            ring = sweep.ring if k == len(sweep.lines) - 1 else None
             axes.plot(place[chosen], means[chosen], "o", ms=9, mfc="none", mec="0.2", mew=1.4, label=ring)
         axes.set_xticks(place, [value if isinstance(value, str) else f"{value:g}" for value in sweep.values])
         axes.set_xlabel(sweep.label, fontsize=9)

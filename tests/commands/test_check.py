@@ -95,3 +95,14 @@ def test_a_real_set(data_set):
     assert "430 test pairs, 310 with both maps" in text
     row = next(line for line in text.splitlines() if line.startswith("40 "))
     assert "boundary edges: 350" in row
+
+
+def test_a_folder_of_sets_is_answered_with_the_sets(tmp_path, capsys):
+    layouts.sga18(tmp_path / "TOSCA")
+    layouts.mpi_faust(tmp_path / "deep" / "FAUST")
+    out, error = checked(capsys, tmp_path)
+    assert error == ""
+    assert f"TOSCA_5k_remeshed: 3 shapes (SGA18/BCICP remeshed TOSCA) in {tmp_path / 'TOSCA'}" in out
+    assert "2 sets; csm check" in out
+    out, error = checked(capsys, tmp_path, use="train")
+    assert "did you mean" in error

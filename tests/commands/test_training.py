@@ -26,7 +26,7 @@ TOYS = [*SMALL, "data.root=toys"]
         ([*TOYS, "objective=fit/age", "callbacks=none"], "fit/age: the callback that measures it was left out"),
         ([*TOYS, "objective=age/toys", "test=false"], "objective=age/toys: test=false leaves it out"),
         ([*TOYS, "pretrained=nowhere.ckpt"], "nowhere.ckpt: there is no such checkpoint"),
-        ([*TOYS, "pretrained=humans"], "pretrained=humans: its input is another descriptor (stack"),
+        ([*TOYS, "pretrained=humans"], "wanted descriptor=acd_two_bands, or a recipe that has it"),
         (["recipe=acscnn", "experiment=humans_paper"], "experiment=humans_paper chooses csmcnn"),
     ],
 )

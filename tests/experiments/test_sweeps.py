@@ -30,6 +30,7 @@ def sweep(tmp_path):
             f"model.ks={ks}",
             f"optimizer.lr={rate}",
             f"seed={seed}",
+            "data.root='meshes/own'",
         ]
         place = write_job(tmp_path, str(k), overrides, **{"age/a": error, "age/b": 3 * error, "train/loss": 9.0 - k})
         with SummaryWriter(place / "tensorboard") as log:
@@ -64,6 +65,7 @@ def test_the_page_names_the_best_and_holds_every_job(sweep):
     assert best.settings["optimizer.lr"] == "0.003"
     page = (sweep / "sweep.html").read_text()
     assert "csm train experiment=humans +trainer.limit_train_batches=2 model.ks=128 optimizer.lr=0.003" in page
+    assert "data.root=meshes/own" in page, "a plain path without the quotes that csm puts around it"
     assert "failed: no memory" in page
     for heading in ("The best", "All jobs, best first", "What each parameter does", "Training losses"):
         assert f"<h2>{heading}</h2>" in page

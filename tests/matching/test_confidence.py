@@ -52,6 +52,13 @@ def test_the_verdict_gets_worse_as_fewer_can_be_trusted(share, said):
     assert found.trusted == pytest.approx(share)
 
 
+@pytest.mark.parametrize(("confidence", "said"), [(1.0, "or more)"), (0.96, "about one in 25 may still be wrong")])
+def test_the_verdict_says_how_many_may_be_wrong_although_all_are_trusted(confidence, said):
+    verdict = Confidence(np.full(100, confidence), np.zeros(100)).verdict
+    assert verdict.startswith("all of the source has a trustworthy partner")
+    assert verdict.endswith(said)
+
+
 def test_returning_counts_what_is_matched():
     distance = np.array([0.5 * NEAR, 3 * NEAR, np.inf, 0.0])
     assert Confidence(np.zeros(4), distance).returned == pytest.approx(2 / 3)
