@@ -27,16 +27,12 @@ class RefinedMap:
         What was done, in words, with its figures.
     ambiguous
         Whether another map was found that is about as good: the shapes look the same in several ways.
-    misfit
-        Of a map that was chosen among several, what it was chosen by: stretch, commutation and the distance of the
-        descriptors, summed (`csm.matching.refinement.batch.Scores`); 0 where nothing was chosen.
     """
 
     forward: Way
     backward: Way | None = None
     text: str = ""
     ambiguous: bool = False
-    misfit: float = 0.0
 
 
 class Refiner(ABC):

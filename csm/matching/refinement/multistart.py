@@ -90,14 +90,11 @@ class Chosen:
         What was done, in words.
     ambiguous
         See `Solutions.ambiguous`.
-    misfit
-        Its sum of scores (`Scores.total`).
     """
 
     matrix: Tensor
     text: str
     ambiguous: bool
-    misfit: float
 
 
 @dataclass(frozen=True)
@@ -161,7 +158,7 @@ class Multistart(Refiner):
         pair = Pair.of(source, target)
         chosen = self.search(start, pair)
         done = finished(self.climb(chosen.matrix, pair), pair, self.climb, start, chosen.text)
-        return replace(done, ambiguous=chosen.ambiguous, misfit=chosen.misfit)
+        return replace(done, ambiguous=chosen.ambiguous)
 
     def search(self, start: VertexMap, pair: Pair) -> Chosen:
         """Return the best start."""
@@ -174,7 +171,7 @@ class Multistart(Refiner):
             f"descriptor {float(judged.descriptor[best]):.2f}), refined jointly with the descriptor to functional maps "
             f"of {self.climb.sizes(pair.k)[-1]} functions"
         )
-        return Chosen(found.matrices[best], text, found.ambiguous, float(judged.total[best]))
+        return Chosen(found.matrices[best], text, found.ambiguous)
 
     def solutions(self, starts: Tensor, pair: Pair) -> Solutions:
         """Refine functional maps to begin with, (B, K, K), and return the best that differ, see `finals`."""

@@ -60,8 +60,6 @@ def test_a_start_that_is_wrong_everywhere_is_left_for_a_better_one(store):
     vertices = found.target.mesh.vertices
     off = np.linalg.norm(vertices[made.forward.vertex_map.indices] - vertices[found.truth], axis=1)
     assert off.mean() < 0.1 * np.linalg.norm(vertices[wrong] - vertices[found.truth], axis=1).mean()
-    judged = re.search(r"stretch ([\d.]+), commutation ([\d.]+), descriptor ([\d.]+)", made.text)
-    assert made.misfit == pytest.approx(sum(map(float, judged.groups())), abs=0.02)
 
 
 def test_of_several_finalists_the_best_judged_is_taken(store):
