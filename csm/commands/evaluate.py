@@ -31,6 +31,8 @@ def run(cfg: DictConfig) -> dict[str, Any]:
             "evaluate needs checkpoint=PATH, a .ckpt that csm train wrote, or checkpoint=humans, which csm brings"
         )
     method = load_model(cfg.checkpoint)
+    if not list(cfg.data.get("test", [""])):
+        raise ConfigError("data.test=[]: wanted a set to test on at least")
     data, protocol, matching = make_data(cfg, method.recipe), make_protocol(cfg), matching_of(cfg)
     require_results(cfg.results)
     require_sound(data, exact=protocol.distance == "exact" and not protocol.fallback, train=False)

@@ -76,8 +76,12 @@ def load_module(path: str | os.PathLike[str]) -> Describer:
     if not isinstance(path, str | os.PathLike):
         raise ConfigError(f"a checkpoint is given by its path, got a {type(path).__name__}")
     path = Path(path)
-    if path.name == WEIGHTS:  # the settings beside the weights say what they are of
-        path = path.with_name(SETTINGS)
+    if path.suffix == Path(WEIGHTS).suffix:  # the settings beside the weights say what they are of
+        path = path.with_suffix(Path(SETTINGS).suffix)
+    if path.is_dir():
+        held = [file for file in ("model.ckpt", SETTINGS, f"export/{SETTINGS}") if (path / file).is_file()]
+        inside = f"; wanted {path / held[0]}" if held else ", and no model.ckpt or model.json is in it"
+        raise DataError(f"{path}: a folder, not a checkpoint{inside}")
     if not path.is_file():
         raise DataError(
             f"{path}: there is no such checkpoint; csm train writes model.ckpt into its output folder, and csm brings "
@@ -156,12 +160,11 @@ def _load_export(path: Path) -> Describer:
     hparams = json.loads(read_bytes(path))
     require_plain(hparams, path)
     module = Describer.of(hparams)
+    beside = path.with_suffix(Path(WEIGHTS).suffix)
     try:
-        weights = load_file(path.with_name(WEIGHTS))
+        weights = load_file(beside)
     except (OSError, SafetensorError) as error:
-        raise DataError(
-            f"{path.with_name(WEIGHTS)}: cannot be read ({error}); it belongs beside {path.name}"
-        ) from error
+        raise DataError(f"{beside}: cannot be read ({error}); it belongs beside {path.name}") from error
     own = {name: tensor.shape for name, tensor in module.weights().items()}
     given = {name: tensor.shape for name, tensor in weights.items()}
     for name in sorted(own.keys() | given.keys()):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import tempfile
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import permutations
 from pathlib import Path
@@ -48,13 +49,22 @@ def require_pairs(pairs: str) -> None:
 def places(names: Sequence[str]) -> list[str]:
     """Return every file, relative to the folder, that a collection of these names may leave besides its account.
 
+    Raises
+    ------
+    ConfigError
+        If two of the files would have one name.
+
     Examples
     --------
     >>> places(["a", "b"])
     ['collection.html', 'reference.ply', 'shapes/a.ply', 'shapes/b.ply', 'maps/a_to_b.txt', 'maps/b_to_a.txt']
     """
-    shapes = [f"shapes/{_plain(name)}.ply" for name in names]
-    return [PAGE, REFERENCE, *shapes, *(_map_file(a, b) for a, b in permutations(names, 2))]
+    files = [f"shapes/{_plain(name)}.ply" for name in names]
+    files += [_map_file(a, b) for a, b in permutations(names, 2)]
+    twice = [file for file, times in Counter(files).items() if times > 1]
+    if twice:
+        raise ConfigError(f"{twice[0]} would be the file of two shapes or two pairs; give the meshes other names")
+    return [PAGE, REFERENCE, *files]
 
 
 def save_collection(

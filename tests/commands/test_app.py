@@ -40,6 +40,7 @@ def visible(folder: Path) -> set[str]:
         (["train", "resume=gone.ckpt"], "gone.ckpt: there is no such checkpoint"),
         (["train", "trainer.precision=3"], "precision"),
         (["evaluate", "gone.ckpt"], "gone.ckpt: there is no such checkpoint"),
+        (["evaluate", "humans", "data.test=[]"], "data.test=[]: wanted a set to test on at least"),
         (["matrix"], "matrix needs rows"),
         (["trian"], "did you mean train?"),
     ],
@@ -112,6 +113,14 @@ def test_no_command_writes_over_its_input(csm, tmp_path):
         assert csm(*words)[0] == 2
     assert {name: (tmp_path / name).read_bytes() for name in before} == before
     assert visible(tmp_path) == set(before)
+
+
+def test_clean_writes_nothing_where_nothing_is_left(csm, tmp_path):
+    (tmp_path / "point.off").write_text("OFF\n3 1 0\n1 1 1\n1 1 1\n1 1 1\n3 0 1 2\n")
+    status, _, error = csm("clean", "point.off", "clean.ply")
+    assert status == 2
+    assert "point.off: nothing is left of it" in error
+    assert [path.name for path in tmp_path.glob("clean*")] == []
 
 
 def test_clean_writes_the_mesh_its_maps_and_an_account(csm, tmp_path):

@@ -36,6 +36,26 @@ def test_an_export_gives_the_same_descriptor(module, tmp_path, classifier):
     assert torch.equal(again.network.classifier.weight, module.network.classifier.weight) == classifier
 
 
+def test_an_export_of_another_name_keeps_its_own_weights(module, tmp_path):
+    path = export_module(module, tmp_path)
+    for file in (path, path.with_name("model.safetensors")):
+        file.rename(tmp_path / f"best{file.suffix}")
+    with torch.no_grad():
+        for weights in (other := load_module(tmp_path / "best.json")).weights().values():
+            weights.zero_()
+    export_module(other, tmp_path)
+    assert any(tensor.any() for tensor in load_module(tmp_path / "best.safetensors").weights().values())
+
+
+def test_a_folder_is_answered_with_the_checkpoint_in_it(module, tmp_path):
+    with pytest.raises(DataError, match=r"a folder, not a checkpoint, and no model.ckpt or model.json is in it"):
+        load_module(tmp_path)
+    path = export_module(module, tmp_path / "export")
+    for folder in (tmp_path, tmp_path / "export"):
+        with pytest.raises(DataError, match=f"a folder, not a checkpoint; wanted {path}"):
+            load_module(folder)
+
+
 def test_an_export_is_json_and_safetensors_only(module, tmp_path):
     path = export_module(module, tmp_path)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["model.json", "model.safetensors"]

@@ -95,3 +95,9 @@ def test_all_pairs_of_few_shapes_and_those_of_the_reference_of_many():
     assert len(chosen_pairs(21, 4, "auto")) == 40
     assert all(4 in pair for pair in chosen_pairs(21, 4, "auto"))
     assert len(chosen_pairs(21, 4, "all")) == 420
+
+
+@pytest.mark.parametrize("names", [["a", "b", "a_to_b", "b_to_b"], ["a/b", "a_b"]])
+def test_names_that_would_share_a_file_are_refused(names):
+    with pytest.raises(ConfigError, match=r"would be the file of two .* give the meshes other names"):
+        places(names)
