@@ -72,8 +72,9 @@ def _judged(
     forward = done.forward
     there, back = forward.vertex_map, backward.vertex_map
     sides, other = Sides(source, target, there, back), Sides(target, source, back, there)
-    return BothWays(
-        replace(forward, confidence=replace(confidence_of(sides, first), ambiguous=done.ambiguous)),
-        replace(backward, confidence=replace(confidence_of(other, second), ambiguous=done.ambiguous)),
-        done.text,
-    )
+
+    def believed(way: Way, sides: Sides, start: VertexMap | None) -> Way:
+        found = confidence_of(sides, start)
+        return replace(way, confidence=replace(found, ambiguous=done.ambiguous, strained=done.strained))
+
+    return BothWays(believed(forward, sides, first), believed(backward, other, second), done.text)

@@ -30,6 +30,12 @@ AMBIGUOUS = (
 )
 """What is added to the verdict on symmetric shapes."""
 
+STRAINED = (
+    "WARNING: even the best map that was found keeps areas, lengths and the descriptor badly, so it is probably wrong "
+    "whatever its confidence says; csm check may tell what is odd about the meshes"
+)
+"""What is added to the verdict where a search found nothing that fits."""
+
 
 @dataclass(frozen=True, eq=False)
 class Confidence:
@@ -47,11 +53,14 @@ class Confidence:
     ambiguous
         Whether a refinement found another map that is about as good, since the shapes look the same in several ways.
         `values` are those of the map that was taken, as if it were the only one.
+    strained
+        Whether even the best map of a search keeps areas, lengths and the descriptor badly; `values` do not know of it.
     """
 
     values: FloatArray
     distance: FloatArray
     ambiguous: bool = False
+    strained: bool = False
 
     @property
     def returned(self) -> float:
@@ -67,7 +76,8 @@ class Confidence:
     @property
     def verdict(self) -> str:
         """One sentence for people on how far to believe the map."""
-        return self._share + (f"; {AMBIGUOUS}" if self.ambiguous else "")
+        added = (text for text, holds in ((AMBIGUOUS, self.ambiguous), (STRAINED, self.strained)) if holds)
+        return "; ".join([self._share, *added])
 
     @property
     def _share(self) -> str:

@@ -162,6 +162,7 @@ def _account(match: Match, meaning: str, method: str) -> dict[str, Any]:
         "returned": match.confidence.returned,
         "trusted": match.confidence.trusted,
         "ambiguous": match.confidence.ambiguous,
+        "strained": match.confidence.strained,
         "verdict": match.confidence.verdict,
         "notes": list(match.notes),
         "command": made.command,

@@ -10,6 +10,7 @@ from csm.matching import VertexMap
 from csm.matching.base import Described
 from csm.matching.calibration import Calibration
 from csm.matching.confidence import (
+    AMBIGUOUS,
     TRUSTED,
     Confidence,
     confidence_of,
@@ -57,6 +58,12 @@ def test_the_verdict_says_how_many_may_be_wrong_although_all_are_trusted(confide
     verdict = Confidence(np.full(100, confidence), np.zeros(100)).verdict
     assert verdict.startswith("all of the source has a trustworthy partner")
     assert verdict.endswith(said)
+
+
+def test_the_verdict_warns_where_a_search_found_nothing_that_fits():
+    sure = Confidence(np.ones(3), np.zeros(3), ambiguous=True, strained=True).verdict
+    assert sure.startswith("all of the source has")
+    assert sure.index(AMBIGUOUS) < sure.index("; WARNING: even the best map that was found keeps areas")
 
 
 def test_returning_counts_what_is_matched():

@@ -27,12 +27,15 @@ class RefinedMap:
         What was done, in words, with its figures.
     ambiguous
         Whether another map was found that is about as good: the shapes look the same in several ways.
+    strained
+        Whether even the best map that was found keeps areas, lengths and the descriptor badly.
     """
 
     forward: Way
     backward: Way | None = None
     text: str = ""
     ambiguous: bool = False
+    strained: bool = False
 
 
 class Refiner(ABC):

@@ -39,6 +39,7 @@ _APART = 0.5  # |C - C'| / sqrt(K) from which two functional maps are different 
 _CLEARLY_APART = 1.0  # the same, of a map that is another symmetry; unrelated orthogonal maps have 1.41
 _ISOMETRIC = 0.35  # stretch and commutation up to which a map is nearly an isometry
 _TIED, _ISOMETRIC_TIED = 0.01, 0.5  # the same, of a map whose sum of scores is that of the best up to the first
+_STRAINED = 1.5  # sum of the scores of a map that cannot be right; right ones of humans and animals had 1.2 or less
 _DESCRIBED = 0.5  # how much worse the descriptor may be kept, whose total variance is 1
 
 
@@ -77,6 +78,11 @@ class Solutions:
         described = judged.descriptor <= judged.descriptor[best] + _DESCRIBED
         return bool(((apart >= _CLEARLY_APART) & isometric & described).any())
 
+    @property
+    def strained(self) -> bool:
+        """Whether even the best one keeps areas, lengths and the descriptor too badly to be right."""
+        return bool(self.scores.total[self.best] > _STRAINED)
+
 
 @dataclass(frozen=True, eq=False)
 class Chosen:
@@ -88,13 +94,14 @@ class Chosen:
         Its functional map, (K, K) for the first K of the schedule.
     text
         What was done, in words.
-    ambiguous
-        See `Solutions.ambiguous`.
+    ambiguous, strained
+        See `Solutions.ambiguous` and `Solutions.strained`.
     """
 
     matrix: Tensor
     text: str
     ambiguous: bool
+    strained: bool
 
 
 @dataclass(frozen=True)
@@ -158,7 +165,7 @@ class Multistart(Refiner):
         pair = Pair.of(source, target)
         chosen = self.search(start, pair)
         done = finished(self.climb(chosen.matrix, pair), pair, self.climb, start, chosen.text)
-        return replace(done, ambiguous=chosen.ambiguous)
+        return replace(done, ambiguous=chosen.ambiguous, strained=chosen.strained)
 
     def search(self, start: VertexMap, pair: Pair) -> Chosen:
         """Return the best start."""
@@ -171,7 +178,7 @@ class Multistart(Refiner):
             f"descriptor {float(judged.descriptor[best]):.2f}), refined jointly with the descriptor to functional maps "
             f"of {self.climb.sizes(pair.k)[-1]} functions"
         )
-        return Chosen(found.matrices[best], text, found.ambiguous)
+        return Chosen(found.matrices[best], text, found.ambiguous, found.strained)
 
     def solutions(self, starts: Tensor, pair: Pair) -> Solutions:
         """Refine functional maps to begin with, (B, K, K), and return the best that differ, see `finals`."""

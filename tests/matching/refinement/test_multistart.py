@@ -180,6 +180,9 @@ def test_another_map_counts_only_if_it_is_clearly_another_and_an_isometry():
         parts = torch.tensor([best / 2, of_second / 2, of_third / 2])
         return Solutions(maps, Scores(parts, parts, torch.tensor([0.1, descriptor, 0.1])))
 
+    assert not found(1.5, 1.5, best=1.3).strained
+    assert found(1.5, 1.5, best=1.5).strained
+    assert not found(0.3, 1.5, best=1.5).strained, "the second is better"
     assert found(0.3, 0.9).ambiguous
     assert not found(0.4, 0.9).ambiguous, "no isometry"
     assert found(0.4, 0.9, best=0.4, descriptor=0.105).ambiguous, "a tie"
