@@ -49,9 +49,8 @@ def train(cfg: DictConfig) -> dict[str, Any] | None:
         tests = counted(len(training.data.split.test), "test shape")
         begins = f"; begins with the weights of {training.pretrained}" if training.pretrained else ""
         print(f"{training.name}: {training.data.protocol}; {tests}{begins}", flush=True)
-        every, epochs = cfg.trainer.check_val_every_n_epoch, cfg.trainer.max_epochs
-        if every and epochs and 0 < epochs < every:
-            print(f"no validation in {counted(epochs, 'epoch')}: trainer.check_val_every_n_epoch={every}", flush=True)
+        if ends_before_validation(cfg):
+            print(f"no validation: trainer.check_val_every_n_epoch={cfg.trainer.check_val_every_n_epoch}", flush=True)
     trained = fit(training, folder, cfg.resume)
     if HydraConfig.get().mode == RunMode.RUN:  # the jobs of a sweep that torchrun started go on together
         part()
@@ -74,6 +73,12 @@ _NUMBERS = ("val/", "fit/", "train/", "step/", "age/", "exact/", "seconds", "par
 _MEASURED = tuple(f"{group}/{name}" for group in (UNSEEN, FITTED) for name in ("age", "exact", "far", "flip"))
 
 
+def ends_before_validation(cfg: DictConfig) -> bool:
+    """Tell whether a training has fewer epochs than there are to its first validation."""
+    every, epochs = cfg.trainer.check_val_every_n_epoch, cfg.trainer.max_epochs
+    return bool(every and epochs and 0 < epochs < every)
+
+
 def require_objective(cfg: DictConfig, training: Training) -> None:
     """Raise a ConfigError if the objective of a sweep is a number that the training will not have."""
     if cfg.objective is None:
@@ -87,13 +92,14 @@ def require_objective(cfg: DictConfig, training: Training) -> None:
     if name in _MEASURED and not any(isinstance(each, ValidationErrors) for each in training.callbacks):
         raise ConfigError(f"objective={name}: the callback that measures it was left out; wanted callbacks=default")
     if name.startswith(f"{UNSEEN}/"):
-        data, every, epochs = training.data, cfg.trainer.check_val_every_n_epoch, cfg.trainer.max_epochs
+        data = training.data
         if not data.validates_unseen or len(data.validation_names) < 2:
             raise ConfigError(
                 f"objective={name}: no two shapes are held out to validate on, so there is no such number; "
                 "data.holdout=10 holds ten of the training shapes out"
             )
-        if every and epochs and 0 < epochs < every:
+        if ends_before_validation(cfg):
+            every, epochs = cfg.trainer.check_val_every_n_epoch, cfg.trainer.max_epochs
             raise ConfigError(
                 f"objective={name}: trainer.check_val_every_n_epoch={every} validates later than the last of "
                 f"trainer.max_epochs={epochs}; wanted at most {epochs}"

@@ -6,8 +6,9 @@ import json
 
 import pytest
 import yaml
+from omegaconf import OmegaConf
 
-from csm.commands.training import with_objective
+from csm.commands.training import ends_before_validation, with_objective
 from tests.commands.test_pipeline import SMALL, Bench
 
 TOYS = [*SMALL, "data.root=toys"]
@@ -37,6 +38,14 @@ def test_an_error_comes_before_the_training(tmp_path, monkeypatch, capsys, argum
     assert stopped.value.code == 2
     assert message in capsys.readouterr().err
     assert not (tmp_path / "run/model.ckpt").exists()
+
+
+@pytest.mark.parametrize(
+    ("every", "epochs", "never"), [(5, 4, True), (5, 5, False), (5, -1, False), (5, 0, False), (None, 3, False)]
+)
+def test_a_short_training_ends_before_its_first_validation(every, epochs, never):
+    trainer = {"check_val_every_n_epoch": every, "max_epochs": epochs}
+    assert ends_before_validation(OmegaConf.create({"trainer": trainer})) == never
 
 
 def test_a_sweeper_is_told_the_number_that_it_makes_small(tmp_path, monkeypatch):
