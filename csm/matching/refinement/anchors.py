@@ -24,19 +24,19 @@ FAR = 0.15
 """How far points in faces may be from such a partner, in the same units: a tenth of a human's geodesic diameter."""
 
 
-class BothWays(NamedTuple):
+class ThereAndBack(NamedTuple):
     """Maps between two shapes, source -> target and target -> source."""
 
     there: VertexMap
     back: VertexMap
 
 
-def nearest_both_ways(source: Described, target: Described) -> BothWays:
+def nearest_both_ways(source: Described, target: Described) -> ThereAndBack:
     """Return the nearest neighbours of both shapes in each other."""
-    return BothWays(_nearest(source, target), _nearest(target, source))
+    return ThereAndBack(_nearest(source, target), _nearest(target, source))
 
 
-def astray(ways: BothWays, source: Described, target: Described) -> float:
+def astray(ways: ThereAndBack, source: Described, target: Described) -> float:
     """Return how far vertices are from where they return, on average over both shapes, counted up to `SURE`.
 
     Of two maps of one pair the better one mostly has less, where none has parts that are far off.
@@ -46,7 +46,7 @@ def astray(ways: BothWays, source: Described, target: Described) -> float:
     return float(sum(np.minimum(distance, SURE).mean() for distance in (there, back)) / 2)
 
 
-def anchored(done: RefinedMap, source: Described, target: Described, nearest: BothWays) -> RefinedMap:
+def anchored(done: RefinedMap, source: Described, target: Described, nearest: ThereAndBack) -> RefinedMap:
     """Return a refined map in which vertices whose nearest neighbours return have these for partners.
 
     What is refined then is the rest: vertices that the descriptor is not sure of.  Functional maps know shapes by their

@@ -18,7 +18,7 @@ from csm.errors import ConfigError
 from csm.matching.base import Described
 from csm.matching.confidence import returning
 from csm.matching.maps import VertexMap
-from csm.matching.refinement.anchors import BothWays, anchored, astray, nearest_both_ways
+from csm.matching.refinement.anchors import ThereAndBack, anchored, astray, nearest_both_ways
 from csm.matching.refinement.base import RefinedMap, Refiner
 from csm.matching.refinement.joint import Joint
 from csm.matching.refinement.multistart import Multistart
@@ -75,7 +75,7 @@ class Trusting(Refiner):
         """Return the refined map of a start that is trusted, and in words what became of the start."""
         nearest, done = nearest_both_ways(source, target), self.joint(start, source, target)
         if done.backward is not None:
-            refined = BothWays(done.forward.vertex_map, done.backward.vertex_map)
+            refined = ThereAndBack(done.forward.vertex_map, done.backward.vertex_map)
             if astray(refined, source, target) < astray(nearest, source, target):
                 return done, "refined throughout"
         return anchored(done, source, target, nearest), "kept"

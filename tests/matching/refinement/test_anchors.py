@@ -7,7 +7,7 @@ import torch
 from csm.matching.barycentric import BarycentricMap
 from csm.matching.base import Described
 from csm.matching.maps import VertexMap
-from csm.matching.refinement.anchors import SURE, BothWays, anchored, astray, nearest_both_ways
+from csm.matching.refinement.anchors import SURE, ThereAndBack, anchored, astray, nearest_both_ways
 from csm.matching.refinement.base import RefinedMap
 from csm.matching.way import Way
 from tests.shapes import blob
@@ -66,6 +66,6 @@ def test_vertices_are_astray_by_how_far_they_return_and_no_farther_than_is_sure(
     assert astray(KNOWN, SAME, SAME) == 0
     there = np.arange(162)
     there[:81] = AWAY[:81]
-    found = BothWays(VertexMap(there, 162), KNOWN.back)
+    found = ThereAndBack(VertexMap(there, 162), KNOWN.back)
     assert astray(found, SAME, SAME) == pytest.approx(0.5 * SURE)
-    assert astray(BothWays(found.back, found.there), SAME, SAME) == pytest.approx(0.5 * SURE)
+    assert astray(ThereAndBack(found.back, found.there), SAME, SAME) == pytest.approx(0.5 * SURE)
