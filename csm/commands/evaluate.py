@@ -31,9 +31,9 @@ def run(cfg: DictConfig) -> dict[str, Any]:
             "evaluate needs checkpoint=PATH, a .ckpt that csm train wrote, or checkpoint=humans, which csm brings"
         )
     method = load_model(cfg.checkpoint)
-    if not list(cfg.data.get("test", [""])):
-        raise ConfigError("data.test=[]: wanted a set to test on at least")
     data, protocol, matching = make_data(cfg, method.recipe), make_protocol(cfg), matching_of(cfg)
+    if not data.test_sets:
+        raise ConfigError("data.test=[]: wanted a set to test on at least")
     require_results(cfg.results)
     require_sound(data, exact=protocol.distance == "exact" and not protocol.fallback, train=False)
     tested = measure_all(method, data, protocol, matching=matching, table=cfg.table, device=cfg.device)

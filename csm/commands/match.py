@@ -20,7 +20,7 @@ from csm.commands.app import command
 from csm.commands.groups import plain, register
 from csm.commands.outputs import OVERWRITE, require_new_in_sweep, require_place
 from csm.data.store import Store
-from csm.descriptors.presets import PRESETS
+from csm.descriptors.presets import preset_name
 from csm.errors import ConfigError
 from csm.matching import DescriptorMethod, Method, match_meshes
 from csm.matching.shipped import shipped_models
@@ -106,8 +106,7 @@ def _method(cfg: DictConfig) -> tuple[Method | str, str]:
 def _called(method: Method, file: str) -> str:
     """Return what to call a method in a sentence."""
     if isinstance(method, DescriptorMethod):
-        known = next((name for name, setting in PRESETS.items() if setting == method.descriptor), None)
-        return f"the descriptor {known or method.descriptor}"
+        return f"the descriptor {preset_name(method.descriptor) or method.descriptor}"
     trained = getattr(method, "trained_on", "")
     return f"the learned descriptor of {file or method.name}" + (f" (trained on {trained})" if trained else "")
 

@@ -131,6 +131,17 @@ def preset(name: str, **overrides: Any) -> Descriptor:
     return replace(descriptor, **overrides)
 
 
+def preset_name(descriptor: Descriptor) -> str | None:
+    """Return the key of `PRESETS` that has a descriptor's parameters, or None.
+
+    Examples
+    --------
+    >>> preset_name(preset("acd_paper")), preset_name(preset("acd_paper", k=12))
+    ('acd_paper', None)
+    """
+    return next((name for name, setting in PRESETS.items() if setting == descriptor), None)
+
+
 def from_parameters(name: str, *, version: int = 1, **parameters: Any) -> Descriptor:
     """Return the descriptor of a record, as `csm.descriptors.base.record` makes it for checkpoints and the store.
 

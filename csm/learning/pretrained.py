@@ -7,8 +7,7 @@ from typing import Any
 
 import torch
 
-from csm.descriptors.base import record
-from csm.descriptors.presets import PRESETS
+from csm.descriptors.presets import from_parameters, preset_name
 from csm.errors import ConfigError
 from csm.learning.describer import Describer
 from csm.learning.module import CSMModule
@@ -89,8 +88,7 @@ def take_over(module: CSMModule, source: Describer) -> bool:
 
 def _wanted(given: dict[str, Any]) -> str:
     """Say which descriptor a training has to take, by its preset if it is one."""
-    known = (name for name, descriptor in PRESETS.items() if json.loads(json.dumps(record(descriptor))) == given)
-    name = next(known, None)
+    name = preset_name(from_parameters(**given))
     if name is None:
         return "give the training the descriptor of that network"
     return f"wanted descriptor={name}, or a recipe that has it: recipe=own has that of the network humans"

@@ -84,10 +84,8 @@ class Confidence:
         """Say how much of the source has a trustworthy partner."""
         if self.trusted >= 0.9:
             share = "all" if self.trusted == 1 else f"{np.floor(100 * self.trusted):.0f} %"
-            right = np.floor(100 * self.values.mean())
-            wrong = (
-                "" if right >= 98 else f", of which about one in {1 / (1 - self.values.mean()):.0f} may still be wrong"
-            )
+            right = self.values.mean()
+            wrong = f", of which about one in {1 / (1 - right):.0f} may still be wrong" if right < 0.98 else ""
             return f"{share} of the source has a trustworthy partner (a confidence of {TRUSTED:g} or more){wrong}"
         share = _in_words(1 - self.trusted)
         if self.trusted >= 0.6:
