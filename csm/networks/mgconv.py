@@ -18,6 +18,9 @@ Products = Literal["float32", "bfloat16"]
 HELD_BYTES = 3e9
 """Blocks of up to this total size are kept in memory for all layers; greater ones are made anew for every product."""
 
+WHOLE_ROWS = 1024
+"""Rows that are multiplied together where the operators are not taken sparse."""
+
 
 class Patch(NamedTuple):
     """A patch of vertices, the vertices that its wavelets reach, and the weights of these in the wavelets' averages.
@@ -47,15 +50,33 @@ class WaveletOperators:
     products
         "float32" multiplies in the precision of the functions.  "bfloat16" rounds kernel and functions to eight
         significant bits, which is several times faster on processors with matrix units for it.
+    whole
+        Whether the operators are multiplied as full matrices, of which nothing is dropped.  None does so on a graphics
+        card: there a few great products take less time than thousands of small ones, and nothing waits for the host.
     """
 
-    def __init__(self, stencil: Mapping[str, Tensor], dtype: torch.dtype, products: Products = "float32") -> None:
+    def __init__(
+        self,
+        stencil: Mapping[str, Tensor],
+        dtype: torch.dtype,
+        products: Products = "float32",
+        whole: bool | None = None,
+    ) -> None:
         self._evecs, self._responses = stencil["evecs"].to(dtype), stencil["responses"].to(dtype)
-        used = stencil["used"] if "used" in stencil else self._responses.count_nonzero(0)
-        self._used: list[int] = used.tolist()  # the rest are zeros
-        self._rows, self._columns = _split(stencil, "row"), _split(stencil, "column")
-        self._dropped = torch.split(stencil["dropped"].to(dtype), [len(rows) for rows in self._rows])
-        self._extents: list[list[int]] = stencil["extents"].tolist()
+        self._used: list[int]  # eigenfunctions of each wavelet; the responses to the rest are zeros
+        self._extents: list[list[int]]
+        if self._evecs.is_cuda if whole is None else whole:
+            (n, k), s = self._evecs.shape, self.n_wavelets
+            every = torch.arange(n, device=self._evecs.device)
+            self._rows = every.split(WHOLE_ROWS)
+            self._columns = (every,) * len(self._rows)
+            self._dropped = self._evecs.new_zeros(n, s).split(WHOLE_ROWS)
+            self._used, self._extents = [k] * s, [[n] * s] * len(self._rows)
+        else:
+            used = stencil["used"] if "used" in stencil else self._responses.count_nonzero(0)
+            self._used, self._extents = used.tolist(), stencil["extents"].tolist()
+            self._rows, self._columns = _split(stencil, "row"), _split(stencil, "column")
+            self._dropped = stencil["dropped"].to(dtype).split([len(rows) for rows in self._rows])
         self.dtype = torch.bfloat16 if products == "bfloat16" else dtype
         with without_autocast(self._evecs):
             self._held = list(self._make()) if self.n_bytes <= HELD_BYTES else None
@@ -180,7 +201,7 @@ def unit_range(x: Tensor) -> Tensor:
     return (x - least) / torch.where(width > 0, width, torch.ones_like(width))
 
 
-def _split(stencil: Mapping[str, Tensor], kind: str) -> list[Tensor]:
+def _split(stencil: Mapping[str, Tensor], kind: str) -> tuple[Tensor, ...]:
     """Return the rows or columns, whichever `kind` says, of each patch."""
     ends = stencil[f"{kind}_ends"].tolist()
-    return [stencil[f"{kind}s"][a:b] for a, b in itertools.pairwise([0, *ends])]
+    return tuple(stencil[f"{kind}s"][a:b] for a, b in itertools.pairwise([0, *ends]))

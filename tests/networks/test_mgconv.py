@@ -81,6 +81,26 @@ def test_making_blocks_again_gives_what_holding_them_gives(monkeypatch):
     torch.testing.assert_close((made.averages(x), torch.autograd.grad(made.averages(x), x, upstream)[0]), expected)
 
 
+def test_whole_operators_drop_nothing_whatever_the_stencil_does(dense, monkeypatch):
+    """They are what a graphics card multiplies with; blocks of rows that do not divide the vertices are no matter."""
+    monkeypatch.setattr(mgconv, "WHOLE_ROWS", 50)
+    x = functions().requires_grad_()
+    assert MESH.n_vertices % 50 and MESH.n_vertices > 50
+    averages = operators(0.3, whole=True).averages(x)
+    torch.testing.assert_close(averages, torch.einsum("snm,mc->nsc", dense, x), rtol=1e-5, atol=1e-5)
+    upstream = torch.randn_like(averages)
+    expected = torch.autograd.grad(operators(0.0).averages(x), x, upstream)
+    torch.testing.assert_close(torch.autograd.grad(averages, x, upstream), expected, rtol=1e-5, atol=1e-5)
+
+
+@pytest.mark.gpu
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a graphics card")
+def test_a_graphics_card_multiplies_whole_operators(dense):
+    stencil = {name: tensor.cuda() for name, tensor in surface(tolerance=0.3).stencil("wavelets").items()}
+    averages = WaveletOperators(stencil, torch.float64).averages(functions().cuda())
+    torch.testing.assert_close(averages.cpu(), torch.einsum("snm,mc->nsc", dense, functions()), rtol=1e-5, atol=1e-5)
+
+
 def test_blocks_are_as_large_as_they_say():
     blocks = operators(0.01, torch.float32)
     assert sum(p.nbytes for patch in blocks for p in patch.powers) == blocks.n_bytes
