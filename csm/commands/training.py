@@ -23,6 +23,7 @@ from csm.errors import ConfigError
 from csm.experiments.callbacks import ValidationErrors
 from csm.experiments.ranks import NAME, part
 from csm.experiments.report import training_section
+from csm.experiments.resuming import AUTO, resume_point
 from csm.experiments.testing import measure_all, numbers
 from csm.experiments.training import Training, fit
 from csm.learning.loading import FITTED, UNSEEN
@@ -42,6 +43,8 @@ def train(cfg: DictConfig) -> dict[str, Any] | None:
     require_device(cfg.device)
     require_results(cfg.results)
     _ = training.source  # read now, so that a wrong path is told at once
+    if cfg.resume not in (None, AUTO):
+        resume_point(folder, cfg.resume)
     require_sound(training.data, test=cfg.test, exact=protocol.distance == "exact" and not protocol.fallback)
     if processes := processes_to_start(training, folder):
         return train_together(processes, folder)

@@ -139,9 +139,10 @@ def require_same_settings(path: Path, module: CSMModule, epochs: int | None = No
     Raises
     ------
     ConfigError
-        With the settings that differ.
+        With the settings that differ, or if more epochs are done than are wanted.
     """
-    kept, wanted = (_flat(read) for read in (read_checkpoint(path)["hyper_parameters"], module.hparams))
+    read = read_checkpoint(path)
+    kept, wanted = _flat(read["hyper_parameters"]), _flat(module.hparams)
     known = signature(CSMModule).parameters.items()  # a checkpoint of an older csm lacks what came after it
     kept = {name: option.default for name, option in known if name in wanted} | kept
     differing = sorted(key for key in kept.keys() | wanted.keys() if kept.get(key) != wanted.get(key))
@@ -156,6 +157,17 @@ def require_same_settings(path: Path, module: CSMModule, epochs: int | None = No
             f"{path}: was trained with other settings ({told}); go on with those, or begin anew (resume=null, or "
             "another folder)"
         )
+    if epochs is not None and (done := epochs_done(read)) > epochs >= 0:
+        raise ConfigError(
+            f"{path}: {done} epochs are done there, trainer.max_epochs={epochs} wants fewer; ask for {done} or more, or "
+            "begin anew (resume=null, or another folder)"
+        )
+
+
+def epochs_done(checkpoint: Mapping[str, Any]) -> int:
+    """Return how many epochs a training had done when it wrote this checkpoint."""
+    progress = checkpoint.get("loops", {}).get("fit_loop", {}).get("epoch_progress", {}).get("current", {})
+    return int(progress.get("processed", 0))
 
 
 def _flat(node: Mapping[str, Any], above: str = "") -> dict[str, Any]:

@@ -150,6 +150,8 @@ def _fit(training: Training, trainer: L.Trainer, folder: Path, resume: Path | st
     draft = sketch(training, trainer.max_epochs, shapes_per_step(trainer))
     if begin:
         require_same_settings(begin, draft, trainer.max_epochs)
+    elif trainer.max_epochs == 0 and next(draft.network.parameters(), None) is not None:
+        _log.warning("trainer.max_epochs=0: nothing is trained; the weights are those that the training begins with")
     loaded = LightningData(training.data)
     prepare_once(trainer, loaded)
     require_same_begin(trainer, folder, begin)

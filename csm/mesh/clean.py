@@ -104,7 +104,7 @@ def clean(
     Raises
     ------
     MeshError
-        If there are no faces, or coordinates are not finite.
+        If there are no faces, or none with an area, or coordinates are not finite.
     ConfigError
         If `debris` or `tolerance` is not from 0 to below 1.
 
@@ -128,7 +128,9 @@ def clean(
         work.weld(tolerance)
     work.join_short()
     work.note_unsound_faces(unsound + work.drop_unsound_faces())
+    work.require_faces(mesh)
     work.collapse()
+    work.require_faces(mesh)
     if split:
         work.split()
     lone = ~work.used()
@@ -214,6 +216,12 @@ class _Work:
 
     def note_unsound_faces(self, count: int) -> None:
         self._did("faces", count, "face", "left out: corners that coincide, or a face twice")
+
+    def require_faces(self, mesh: Mesh | PolygonMesh) -> None:
+        if not len(self.faces):
+            n = len(mesh.faces) if isinstance(mesh, Mesh) else len(mesh.sizes)
+            every = "its only face vanishes" if n == 1 else f"all of its {n} faces vanish"
+            raise MeshError(f"{mesh.label}: {every}: corners coincide or lie on a line; no surface is left")
 
     def collapse(self) -> None:
         total = 0

@@ -102,6 +102,16 @@ def test_a_training_goes_on_from_its_last_epoch(tmp_path):
     assert (state["epoch"], state["global_step"]) == (3, 12)
 
 
+def test_fewer_epochs_than_are_done_are_refused_and_none_at_all_are_said(tmp_path, caplog):
+    fit(a_training(tmp_path, 2), tmp_path / "run")
+    once = a_training(tmp_path, 1)
+    with pytest.raises(ConfigError, match=r"last\.ckpt: 2 epochs are done there, trainer\.max_epochs=1 wants fewer"):
+        fit(once, tmp_path / "run")
+    assert not caplog.records
+    fit(a_training(tmp_path, 0), tmp_path / "none")
+    assert "nothing is trained" in caplog.text
+
+
 def test_a_limit_of_time_ends_a_training_and_the_checkpoint_says_after_how_many_epochs(tmp_path):
     trainer = partial(L.Trainer, **(QUICK | {"max_epochs": 99_999, "max_time": timedelta(seconds=1)}))
     trained = fit(a_training(tmp_path, trainer=trainer), tmp_path / "run")
