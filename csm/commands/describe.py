@@ -21,6 +21,7 @@ from csm.commands.app import command
 from csm.commands.groups import register
 from csm.commands.outputs import checksum, require_file_place, require_new_in_sweep, require_own_archive
 from csm.descriptors.base import Descriptor
+from csm.descriptors.presets import preset_name
 from csm.errors import ConfigError
 from csm.matching.subjects import subject_of
 from csm.mesh.io import atomic_path
@@ -30,7 +31,7 @@ register("descriptor")
 
 
 ARRAYS = ("values", "columns", "descriptor", "parameters", "checksum")
-"""What the archive holds; the checksum is that of the values."""
+"""What the archive holds; the checksum is that of the values.  Newer ones also name the `preset`."""
 
 
 def run(cfg: DictConfig) -> dict[str, Any]:
@@ -58,6 +59,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
             columns=np.array(features.columns),
             descriptor=np.array(descriptor.name),
             parameters=np.array(json.dumps(descriptor.parameters())),
+            preset=np.array(preset_name(descriptor) or ""),
             checksum=np.array(checksum(values)),
         )
     (n, columns), preset = values.shape, HydraConfig.get().runtime.choices["descriptor"]

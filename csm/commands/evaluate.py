@@ -24,7 +24,9 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     from csm.commands.tested import conclude
     from csm.data.inspection import require_sound
     from csm.experiments.testing import measure_all, numbers
+    from csm.matching.methods import require_classifier
     from csm.matching.network import load_model
+    from csm.matching.registry import matchers
 
     if cfg.checkpoint is None:
         raise ConfigError(
@@ -34,6 +36,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     data, protocol, matching = make_data(cfg, method.recipe), make_protocol(cfg), matching_of(cfg)
     if not data.test_sets:
         raise ConfigError("data.test=[]: wanted a set to test on at least")
+    require_classifier([method], matchers(matching))
     require_results(cfg.results)
     require_sound(data, exact=protocol.distance == "exact" and not protocol.fallback, train=False)
     tested = measure_all(method, data, protocol, matching=matching, table=cfg.table, device=cfg.device)

@@ -42,6 +42,8 @@ def run(cfg: DictConfig) -> dict[str, Any]:
         return run_collection(cfg, method, _called(method, file))
     if None in (cfg.source, cfg.target):
         raise ConfigError("match needs two meshes: csm match SOURCE TARGET [OUT], or a folder of them: folder=DIR")
+    if cfg.pairs != "auto":
+        raise ConfigError(f"pairs={cfg.pairs} goes with folder=DIR only, whose meshes make several pairs")
     for key in ("matching", "refine"):
         if not isinstance(cfg[key], str):
             raise ConfigError(f"{key}={plain(cfg[key])}: a match takes one of them; csm evaluate takes a list")

@@ -109,11 +109,17 @@ def find_set(root: str | Path | None, *names: str) -> FolderSet:
     for name in names:
         if name in found:
             return found[name]
-    there = f"there are {', '.join(sorted(found))}" if found else "no published set was recognised there"
+    there = f"there are {', '.join(sorted(found))}" if found else f"no published set was recognised {_among(place)}"
     raise DataError(
         f"{place.resolve()}: wanted {' or '.join(names)}, but {there}; set data.root (or CSM_DATA) to the folder "
         "that holds it; `csm check FOLDER` tells what is in a folder and where a set is published"
     )
+
+
+def _among(place: Path) -> str:
+    """Return where nothing was recognised: the first folders of a place by name, or "there"."""
+    folders = sorted(each.name for each in place.iterdir() if each.is_dir()) if place.is_dir() else []
+    return f"in its folders {', '.join(folders[:5])}{', ...' if len(folders) > 5 else ''}" if folders else "there"
 
 
 def _first(folder: Path, known: Sequence[Layout]) -> FolderSet | None:

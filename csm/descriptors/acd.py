@@ -92,6 +92,7 @@ class ACD(ByAngle):
     by_component: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.angles < 1 or self.order < 0 or not self.alpha >= 0:
             raise ConfigError(f"{self}: wanted alpha >= 0, angles >= 1 and order >= 0")
         if not self.damping >= 0:

@@ -83,6 +83,7 @@ class ADD(ByAngle):
     name: ClassVar[str] = "add"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.angles < 1 or self.k < 2 or self.n_splines < 2 or not self.alpha >= 0:
             raise ConfigError(f"{self}: wanted alpha >= 0, angles >= 1, k >= 2 and n_splines >= 2")
         self._require_different_angles()

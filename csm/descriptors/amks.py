@@ -68,6 +68,7 @@ class AMKS(Descriptor):
     name: ClassVar[str] = "amks"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.units not in get_args(LengthUnit):
             raise ConfigError(f"{self}: units must be one of {', '.join(get_args(LengthUnit))}")
         if self.k < 2 or self.n_energies < 2 or not self.variance > 0 or not self.time >= 0:

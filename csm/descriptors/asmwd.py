@@ -75,6 +75,7 @@ class ASMWD(ByAngle):
     name: ClassVar[str] = "asmwd"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.angles < 1 or self.k < 2 or self.n_filters < 2 or not self.alpha >= 0:
             raise ConfigError(f"{self}: wanted alpha >= 0, angles >= 1, k >= 2 and n_filters >= 2")
         self._require_different_angles()

@@ -91,6 +91,7 @@ class AWFT(Descriptor):
     name: ClassVar[str] = "awft"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for field in ("alphas", "degrees", "taus", "functions"):  # lists, as json and configuration files have them
             object.__setattr__(self, field, tuple(getattr(self, field)))
         require_known(self.functions, self.normalise)

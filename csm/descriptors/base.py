@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
+from numbers import Integral, Real
 from typing import Any, ClassVar
 
 import numpy as np
@@ -57,6 +58,13 @@ class Features:
         return f"Features({counted(n, 'vertex')}, {counted(q, 'column')}: {' ... '.join(ends)})"
 
 
+_KINDS: Mapping[str, tuple[type, str]] = {
+    "int": (Integral, "a whole number"),
+    "float": (Real, "a number"),
+    "bool": (bool, "true or false"),
+}
+
+
 @dataclass(frozen=True)
 class Descriptor(ABC):
     """A map from a shape to one row of numbers per vertex: the base class of every family of descriptors.
@@ -82,6 +90,17 @@ class Descriptor(ABC):
     version: ClassVar[int] = 1
     added: ClassVar[Mapping[str, Any]] = {}
     by_component: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        """Raise a ConfigError if a parameter is no number where its annotation is one; families check more."""
+        for field in fields(self):
+            kind, _, rest = str(field.type).partition(" | ")
+            accepted, wanted = _KINDS.get(kind, (object, ""))
+            value = getattr(self, field.name)
+            if isinstance(value, accepted) and not (isinstance(value, bool) and accepted in (Integral, Real)):
+                continue
+            if not (value is None and rest == "None"):
+                raise ConfigError(f"{self.name}: {field.name}={value!r}; wanted {wanted}")
 
     @property
     def eigenpairs(self) -> int:

@@ -81,6 +81,7 @@ class DEP(Descriptor):
     name: ClassVar[str] = "dep"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.distance not in get_args(EvolutionDistance):
             raise ConfigError(f"{self}: distance must be one of {', '.join(get_args(EvolutionDistance))}")
         if self.n_scales < 1 or self.k < 2 or not 0 < self.smallest <= self.largest <= 1:

@@ -70,6 +70,7 @@ class GeometryVectors(Descriptor):
     name: ClassVar[str] = "geometry_vectors"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.k < 2 or self.n_splines < 2 or not self.reach > 0:
             raise ConfigError(f"{self}: wanted k >= 2, n_splines >= 2 and reach > 0")
 

@@ -49,6 +49,7 @@ class GPS(Descriptor):
     name: ClassVar[str] = "gps"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.k < 1:
             raise ConfigError(f"{self}: wanted k of at least 1")
 

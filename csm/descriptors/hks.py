@@ -55,6 +55,7 @@ class HKS(Descriptor):
     added: ClassVar[Mapping[str, Any]] = {"first": None, "last": None}
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.k < 2 or self.n_times < 2:
             raise ConfigError(f"{self}: wanted k and n_times of at least 2")
         if self._fixed is None and (self.first, self.last) != (None, None):

@@ -81,6 +81,7 @@ class LPS(Descriptor):
     name: ClassVar[str] = "lps"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         object.__setattr__(self, "radii", tuple(self.radii))  # a list, where they come from a record
         if not self.radii or not min(self.radii) > 0 or self.k < 1:
             raise ConfigError(f"{self}: wanted some radii, all positive, and k of at least 1")

@@ -81,6 +81,7 @@ class SHOT(Descriptor):
     name: ClassVar[str] = "shot"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not self.radius > 0 or self.bins < 1 or self.min_neighbours < 1:
             raise ConfigError(f"{self}: wanted radius > 0, bins >= 1 and min_neighbours >= 1")
 

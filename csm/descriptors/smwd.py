@@ -60,6 +60,7 @@ class SMWD(Descriptor):
     name: ClassVar[str] = "smwd"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.variant not in get_args(WaveletVariant):
             raise ConfigError(f"{self}: variant must be one of {', '.join(get_args(WaveletVariant))}")
         if self.k < 2 or self.n_filters < 2:

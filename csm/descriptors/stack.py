@@ -42,6 +42,7 @@ class Stack(Descriptor):
     name: ClassVar[str] = "stack"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         object.__setattr__(self, "parts", dict(self.parts))
         if not self.parts:
             raise ConfigError("a stack needs at least one descriptor")

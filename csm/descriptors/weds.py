@@ -70,6 +70,7 @@ class WEDS(Descriptor):
     name: ClassVar[str] = "weds"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.k < 2 or self.levels < 1 or self.n_filters < self.levels + 2:
             raise ConfigError(f"{self}: wanted k >= 2, levels >= 1 and n_filters >= levels + 2")
 

@@ -80,6 +80,7 @@ class WFT(Descriptor):
     name: ClassVar[str] = "wft"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for field in ("taus", "functions"):  # lists, as json and configuration files have them
             object.__setattr__(self, field, tuple(getattr(self, field)))
         require_known(self.functions, self.normalise)

@@ -53,6 +53,7 @@ class WKS(Descriptor):
     name: ClassVar[str] = "wks"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.variant not in get_args(WaveVariant):
             raise ConfigError(f"{self}: variant must be one of {', '.join(get_args(WaveVariant))}")
         least = 29 if self.variant == "functional_map" else 2

@@ -27,7 +27,7 @@ from csm.evaluation.protocol import EvaluationProtocol, Pair
 from csm.evaluation.results import Cell, Evaluation, PairErrors, summarise
 from csm.evaluation.targets import Perturbation, Plan, TargetTask, matched_tasks, measure_target
 from csm.matching.base import Matcher, require_device
-from csm.matching.methods import Method, as_method
+from csm.matching.methods import Method, as_method, require_classifier
 from csm.matching.refinement.base import Refiner
 from csm.matching.registry import matchers as as_matchers
 
@@ -106,10 +106,13 @@ def _plan(
     device: str,
     skip_failures: bool,
 ) -> Plan:
+    methods = _by_name([as_method(m) for m in _listed(method)], "methods")
+    if not skip_failures:
+        require_classifier(methods.values(), rules)
     return Plan(
         InMemory(shapes) if isinstance(shapes, Sequence) else shapes,
         protocol or EvaluationProtocol(),
-        _by_name([as_method(m) for m in _listed(method)], "methods"),
+        methods,
         _by_name(rules, "matchers"),
         perturbations or {"": None},
         store or Store(),

@@ -21,7 +21,7 @@ from csm.viewer.figures import figure_to_array
 from csm.viewer.html import Code, Figure, Section, Table, Text, report_html, write_html
 
 MEAN_ERROR = "mean test error"
-"""The quantity that jobs are compared by unless another is asked for: the mean of `age/...` over the test sets."""
+"""The quantity that jobs without held-out shapes are compared by: the mean of `age/...` over the test sets."""
 
 _RESULT = "result.json"
 _SHOWN = ("status", "seconds", "train/loss", "val/age", "fit/age")
@@ -76,9 +76,8 @@ def read_sweep(folder: Path) -> list[SweepJob]:
     """
     files = sorted(folder.glob(f"*/{_RESULT}"), key=lambda path: (len(path.parent.name), path.parent.name))
     if not files:
-        what = (
-            "this is one training, not a sweep" if (folder / _RESULT).is_file() else f"there are no jobs with {_RESULT}"
-        )
+        single = (folder / _RESULT).is_file()
+        what = "this is one training, not a sweep" if single else f"there are no jobs with {_RESULT}"
         raise DataError(f"{folder}: {what}; wanted the folder of a sweep, such as outputs/train_sweep/DATE")
     return [_job(path) for path in files]
 
@@ -181,8 +180,8 @@ def write_sweep_report(folder: Path, out: Path, by: str | None = None) -> SweepJ
     out
         The page, ``.html``.
     by
-        The number that jobs are compared by; the smallest is the best.  By default `MEAN_ERROR`, else `val/age`,
-        else `fit/age`.
+        The number that jobs are compared by; the smallest is the best.  By default `val/age`, of training
+        shapes that were held out, else `MEAN_ERROR`, else `fit/age`.
 
     Raises
     ------
@@ -193,7 +192,7 @@ def write_sweep_report(folder: Path, out: Path, by: str | None = None) -> SweepJ
     """
     jobs = read_sweep(folder)
     quantity = by or next(
-        (q for q in (MEAN_ERROR, "val/age", "fit/age", "train/loss") if any(j.value(q) is not None for j in jobs)), ""
+        (q for q in ("val/age", MEAN_ERROR, "fit/age", "train/loss") if any(j.value(q) is not None for j in jobs)), ""
     )
     ranked = sorted(
         (job for job in jobs if job.value(quantity) is not None), key=lambda job: float(job.value(quantity) or 0)
@@ -230,6 +229,11 @@ def _best_in_words(ranked: Sequence[SweepJob], quantity: str) -> str:
     seeds = {job.settings.get(_SEED) for job in ranked}
     if len(seeds) < 2:
         text += " With one seed, a small difference may be chance: repeat the best ones with seed=0,1,2."
+    if quantity.startswith(("age/", MEAN_ERROR)):
+        text += (
+            " These are errors of test shapes, which promise too much of settings that were chosen by them; held out "
+            "training shapes (data.holdout=10) give val/age to choose by."
+        )
     return text
 
 
@@ -266,16 +270,15 @@ def _effects(ranked: Sequence[SweepJob], quantity: str) -> list[Section]:
     if not shares:
         return []
     known = [(job, float(job.value(quantity) or 0)) for job in ranked]
-    sweeps = []
-    for name in shares:
+    sweeps, rows = [], []
+    for name, share in shares.items():
         groups = _groups(known, name)
+        once = max(map(len, groups.values())) == 1  # such groups account for all variance, whatever they mean
+        rows.append([name, "each value was tried once" if once else f"{100 * share:.0f} %"])
         means: FloatArray = np.array([fmean(group) for group in groups.values()])
-        spread: FloatArray = np.array(
-            [float(np.std(group)) / max(1, len(group) - 1) ** 0.5 for group in groups.values()]
-        )
+        spread: FloatArray = np.array([np.std(group) / max(1, len(group) - 1) ** 0.5 for group in groups.values()])
         best = ranked[0].settings.get(name, "")
         sweeps.append(Sweep(name, list(groups), {quantity: (means, spread)}, best, ring="best job"))
-    rows = [[name, f"{100 * share:.0f} %"] for name, share in shares.items()]
     return [
         Section(
             "What each parameter does",

@@ -34,6 +34,12 @@ class Classifier(NamedTuple):
     bias: Tensor
 
 
+NO_CLASSIFIER = (
+    "matching=argmax needs a trained network with its classifier; a descriptor has none, and an export leaves it out: "
+    "use the .ckpt file"
+)
+
+
 @dataclass(frozen=True, eq=False)
 class Votes:
     """What a classifier over the template says of one shape.
@@ -157,10 +163,7 @@ class Described:
     def votes(self) -> Votes:
         """What the classifier says; ConfigError if there is none."""
         if self.classifier is None:
-            raise ConfigError(
-                "matching=argmax needs a trained network with its classifier; a "
-                "descriptor has none, and an export leaves it out: use the .ckpt file"
-            )
+            raise ConfigError(NO_CLASSIFIER)
         return votes(self.features if self.classified is None else self.classified, self.classifier)
 
     def spectrum(self, k: int) -> Spectrum:
@@ -188,6 +191,8 @@ class Matcher(ABC):
     """
 
     name: ClassVar[str]
+    by_classifier: ClassVar[bool] = False
+    """Whether it needs a method with a classifier over the template points."""
 
     @abstractmethod
     def __call__(self, source: Described, target: Described, at: IntArray | None = None) -> VertexMap:

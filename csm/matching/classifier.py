@@ -15,6 +15,7 @@ class Argmax(Matcher):
     """Each vertex goes to its most probable template point, and from there to the vertex that is most probably it."""
 
     name: ClassVar[str] = "argmax"
+    by_classifier: ClassVar[bool] = True
 
     def __call__(self, source: Described, target: Described, at: IntArray | None = None) -> VertexMap:
         """Return the map through the template; ConfigError if the method has no classifier."""

@@ -14,7 +14,7 @@ from csm.matching.base import Described, Matcher, require_device
 from csm.matching.both import BothWays, match_both_ways
 from csm.matching.confidence import share_returning
 from csm.matching.maps import VertexMap
-from csm.matching.methods import Method, PrecomputedMethod, as_method, describe_all
+from csm.matching.methods import Method, PrecomputedMethod, as_method, describe_all, require_classifier
 from csm.matching.nearest import nearest
 from csm.matching.refinement.base import Refined, Refiner
 from csm.matching.registry import matchers as as_matchers
@@ -77,7 +77,7 @@ def match(
     """
     automatic = isinstance(method, str) and method == AUTO
     chosen, why, known = None if automatic else as_method(method), "", list[Described]()
-    as_matchers([matcher], ["none" if refine == "auto" else refine])  # unknown names are refused before the work
+    require_classifier([chosen] if chosen else [], as_matchers([matcher], ["none" if refine == "auto" else refine]))
     store = store if isinstance(store, Store) else Store(store)
     clean = "off" if isinstance(chosen, PrecomputedMethod) else clean  # its features are of the given vertices
     subjects = subject_of(source, clean, "source"), subject_of(target, clean, "target")
@@ -126,8 +126,8 @@ def _against_input(here: Described, there: Described) -> list[str]:
         return []
     return [
         f"the network may not know such shapes: of its descriptor's nearest neighbours {100 * learned:.0f} % return to "
-        f"their place on the way there and back, of those of the descriptor that it was given {100 * plain:.0f} %; try "
-        "without the network"
+        f"their place on the way there and back, of those of the descriptor that it was given {100 * plain:.0f} %; "
+        "compare it with a match without the network"
     ]
 
 

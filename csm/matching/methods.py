@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -21,7 +21,7 @@ from csm.data.store import Store
 from csm.descriptors.base import Descriptor, record
 from csm.descriptors.presets import preset
 from csm.errors import ConfigError
-from csm.matching.base import Described
+from csm.matching.base import NO_CLASSIFIER, Described, Matcher
 from csm.matching.shipped import shipped_models
 from csm.mesh.shape import Mesh
 
@@ -37,6 +37,9 @@ class Method(ABC):
 
     refine: str = "multistart"
     """Name of the refiner that suits its descriptor."""
+
+    has_classifier: bool | None = None
+    """Whether it says of vertices which template points they are; None where only a described shape tells."""
 
     @property
     @abstractmethod
@@ -78,6 +81,8 @@ class DescriptorMethod(Method):
     descriptor: Descriptor
     name: str = ""
 
+    has_classifier = False
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", self.name or self.descriptor.name)
 
@@ -115,6 +120,8 @@ class PrecomputedMethod(Method):
 
     features: Mapping[str, Tensor | FloatArray]
     name: str = "precomputed"
+
+    has_classifier = False
 
     def __repr__(self) -> str:
         return f"PrecomputedMethod({self.name!r}, {counted(len(self.features), 'mesh')})"
@@ -179,6 +186,12 @@ def describe_all(
     if len({mesh.digest for mesh in meshes}) < len(meshes):
         return [describe(mesh) for mesh in meshes]
     return thread_map(describe, meshes)  # the eigensolver leaves the interpreter's lock free for most of its time
+
+
+def require_classifier(methods: Iterable[Method], matchers: Iterable[Matcher]) -> None:
+    """Raise a ConfigError if a matcher needs a classifier over template points that a method is known not to have."""
+    if any(rule.by_classifier for rule in matchers) and any(method.has_classifier is False for method in methods):
+        raise ConfigError(NO_CLASSIFIER)
 
 
 def as_method(method: Method | Descriptor | str) -> Method:

@@ -37,6 +37,7 @@ class NetworkMethod(Method):
 
     def __init__(self, module: Describer, name: str = "") -> None:
         self.module = module
+        self.has_classifier = module.has_classifier
         self.training: Mapping[str, Any] = module.settings.get("training") or {}
         self.name = name or str(self.training.get("name", "network"))
 

@@ -128,9 +128,7 @@ def clean(
         work.weld(tolerance)
     work.join_short()
     work.note_unsound_faces(unsound + work.drop_unsound_faces())
-    work.require_faces(mesh)
-    work.collapse()
-    work.require_faces(mesh)
+    work.collapse(mesh)
     if split:
         work.split()
     lone = ~work.used()
@@ -223,14 +221,16 @@ class _Work:
             every = "its only face vanishes" if n == 1 else f"all of its {n} faces vanish"
             raise MeshError(f"{mesh.label}: {every}: corners coincide or lie on a line; no surface is left")
 
-    def collapse(self) -> None:
+    def collapse(self, mesh: Mesh | PolygonMesh) -> None:
         total = 0
+        self.require_faces(mesh)
         for _ in range(5):
             count = self._join(collapsed(self.vertices, self.faces, flat_faces(Mesh(self.vertices, self.faces))))
             if not count:
                 break
             total += count
             self._keep_faces(sound_faces(self.faces))
+            self.require_faces(mesh)
         self._did("collapse", total, "vertex", "with faces of zero area only joined with their nearest neighbour")
 
     def split(self) -> None:

@@ -68,15 +68,15 @@ class WaveletOperators:
         if self._evecs.is_cuda if whole is None else whole:
             (n, k), s = self._evecs.shape, self.n_wavelets
             every = torch.arange(n, device=self._evecs.device)
-            self._rows = every.split(WHOLE_ROWS)
+            self._rows = torch.split(every, WHOLE_ROWS)
             self._columns = (every,) * len(self._rows)
-            self._dropped = self._evecs.new_zeros(n, s).split(WHOLE_ROWS)
+            self._dropped = torch.split(self._evecs.new_zeros(n, s), WHOLE_ROWS)
             self._used, self._extents = [k] * s, [[n] * s] * len(self._rows)
         else:
             used = stencil["used"] if "used" in stencil else self._responses.count_nonzero(0)
             self._used, self._extents = used.tolist(), stencil["extents"].tolist()
             self._rows, self._columns = _split(stencil, "row"), _split(stencil, "column")
-            self._dropped = stencil["dropped"].to(dtype).split([len(rows) for rows in self._rows])
+            self._dropped = torch.split(stencil["dropped"].to(dtype), [len(rows) for rows in self._rows])
         self.dtype = torch.bfloat16 if products == "bfloat16" else dtype
         with without_autocast(self._evecs):
             self._held = list(self._make()) if self.n_bytes <= HELD_BYTES else None

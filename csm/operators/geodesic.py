@@ -78,8 +78,9 @@ def geodesics(mesh: MeshLike, method: Method = "exact") -> Geodesics:
         If the mesh has no faces, or (exact only) is not a manifold or has an edge of no length.
     """
     kinds: dict[str, type[_OnMesh]] = {"exact": _Exact, "heat": _Heat, "edge": _Edge}
-    if method not in kinds:
-        raise ConfigError(f"geodesic method {method!r} is unknown: choose one of {', '.join(get_args(Method))}")
+    if not isinstance(method, str) or method not in kinds:
+        shown = repr(method) if isinstance(method, str) else f"a {type(method).__name__}"
+        raise ConfigError(f"geodesic method {shown} is unknown: choose one of {', '.join(get_args(Method))}")
     return kinds[method](as_mesh(mesh))
 
 

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from csm._types import FloatArray
+from csm._types import FloatArray, IntArray
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 
 Axis: TypeAlias = Literal["x", "y", "z"]
 
 _MARGIN = 0.03
+_ALIKE = 0.7  # correlation between vertices and their partners from which one mesh is turned as the other
 _RIGHT_UP = {"x": ((0, 0, 1), (1, 0, 0)), "y": ((1, 0, 0), (0, 1, 0)), "z": ((1, 0, 0), (0, 0, 1))}
 
 
@@ -62,6 +65,39 @@ def body_axes(mesh: Mesh, up: Axis | Literal["auto"]) -> FloatArray:
     """Return, as rows, the unit directions right, up and front of the data: the viewer's at azimuth and elevation 0."""
     right, upward = np.array(_RIGHT_UP[guess_up(mesh) if up == "auto" else up], dtype=np.float64)
     return np.stack([right, upward, np.cross(right, upward)])
+
+
+def turned_alike(mesh: Mesh, to_reference: IntArray, reference: Mesh, axes: FloatArray) -> FloatArray:
+    """Return axes of a mesh with which it is seen as another is with its own, whichever way the files have them stand.
+
+    Parameters
+    ----------
+    mesh
+        N vertices.
+    to_reference
+        Shape (N,), the vertex of the reference that each vertex is mapped to, or -1.
+    reference
+        The other mesh.
+    axes
+        Those of the reference, as `body_axes` returns them.
+
+    Returns
+    -------
+    FloatArray
+        Shape (3, 3): `axes` turned by the rotation that brings the vertices nearest to their partners, both at one size
+        around their middles; those of `body_axes` where no rotation brings them near, as of a map that is wrong.
+    """
+    known = np.flatnonzero(to_reference >= 0)
+    here, there = mesh.vertices[known], reference.vertices[to_reference[known]]
+    here, there = (points - points.mean(axis=0) for points in (here, there)) if known.size else (here, there)
+    sizes = np.linalg.norm(here), np.linalg.norm(there)
+    if known.size < 3 or not min(sizes) > 0:
+        return body_axes(mesh, "auto")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of flat meshes, which any of several rotations suits
+        found, apart = Rotation.align_vectors(there / sizes[1], here / sizes[0])
+    turned: FloatArray = axes @ found.as_matrix()
+    return turned if 1 - apart**2 / 2 >= _ALIKE else body_axes(mesh, "auto")
 
 
 def rotation(mesh: Mesh, view: View) -> FloatArray:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from csm._types import FloatArray, IntArray
 from csm.errors import ConfigError, MeshError
 from csm.mesh.shape import Mesh
-from csm.viewer.camera import View, body_axes
+from csm.viewer.camera import View, body_axes, turned_alike
 from csm.viewer.colors import Colors, ramp
 from csm.viewer.features import compact_features
 
@@ -94,7 +94,8 @@ class Viewer:
         Position of the panel that the maps of the others go to.  A source and a target that it is mapped to are
         ``Viewer([source, target], reference=1)``.
     view
-        Where the viewer stands at first; its axes fit every panel (see `Panel.mesh` and `View.up`).
+        Where the viewer stands at first; its axes fit every panel (see `Panel.mesh` and `View.up`), and panels with a
+        map are turned so that they stand as the reference does.
     error_label
         What the errors are, with their unit, such as "geodesic error, fraction of the diameter".
     error_high
@@ -179,12 +180,20 @@ def scene_json(viewer: Viewer) -> str:
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
+def _axes(panel: Panel, viewer: Viewer) -> FloatArray:
+    """Return the directions right, up and front of a panel: those of the reference panel where it is mapped to it."""
+    reference, up = viewer.panels[viewer.reference].mesh, viewer.view.up
+    if panel.to_reference is None or panel.mesh is reference:
+        return body_axes(panel.mesh, up)
+    return turned_alike(panel.mesh, panel.to_reference, reference, body_axes(reference, up))
+
+
 def _panel_data(panel: Panel, viewer: Viewer) -> dict[str, Any]:
     mesh = panel.mesh
     wide = mesh.n_vertices > 65536
     data: dict[str, Any] = {
         "label": panel.title,
-        "axes": body_axes(mesh, viewer.view.up).tolist(),
+        "axes": _axes(panel, viewer).tolist(),
         "wide": wide,
         "vertices": pack(mesh.vertices, "f4"),
         "faces": pack(mesh.faces, "u4" if wide else "u2"),

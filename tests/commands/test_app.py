@@ -146,6 +146,7 @@ def test_describe_gives_rows_for_the_vertices_of_the_file(csm, tmp_path):
     status, out, _ = csm("describe", "a.off", "d.npz", "descriptor=gps", "descriptor.k=20")
     assert status == 0
     assert "1 vertex in no face" in out
+    assert str(np.load(tmp_path / "d.npz")["preset"]) == ""
     values = np.load(tmp_path / "d.npz")["values"]
     assert np.isnan(values).all(axis=1).sum() == 1
     assert len(values) == 830

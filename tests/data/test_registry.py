@@ -67,6 +67,9 @@ def test_a_set_is_found_by_its_name_first_name_first(tmp_path):
         find_set(tmp_path, "SCAPE_5000")
     with pytest.raises(DataError, match="wanted SCAPE_5000, but no published set was recognised there"):
         find_set(tmp_path / "nowhere", "SCAPE_5000")
+    (tmp_path / "others" / "my_scans").mkdir(parents=True)
+    with pytest.raises(DataError, match="no published set was recognised in its folders my_scans; set"):
+        find_set(tmp_path / "others", "SCAPE_5000")
 
 
 def test_the_default_folder_is_csm_data_or_data(tmp_path, monkeypatch):

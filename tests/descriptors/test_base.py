@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -25,7 +26,7 @@ from csm.descriptors import (
     preset,
 )
 from csm.descriptors.base import as_operators, record
-from csm.errors import CsmError
+from csm.errors import ConfigError, CsmError
 from csm.mesh.io import write_mesh
 from csm.operators import Operators
 from tests.shapes import blob, rotation
@@ -153,6 +154,26 @@ def test_a_family_states_its_fields_and_gets_the_rest():
     assert record(Heights(factor=1.0)) == {"name": "heights", "k": 3, "version": 2}
     assert record(HKS(k=40)) == {"name": "hks", "k": 40, "n_times": 100, "scaled": True}, "without the first version"
     assert (Heights(k=7).eigenpairs, SHOT().eigenpairs, GPS(k=7).eigenpairs) == (7, 0, 8)
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong", "wanted"),
+    [
+        ("hks", {"k": "3"}, "hks: k='3'; wanted a whole number"),
+        ("wks", {"n_energies": 2.5}, "wks: n_energies=2.5; wanted a whole number"),
+        ("acd", {"k": True}, "acd: k=True; wanted a whole number"),
+        ("acd", {"alpha": None}, "acd: alpha=None; wanted a number"),
+        ("acd", {"normalise": "yes"}, "acd: normalise='yes'; wanted true or false"),
+    ],
+)
+def test_a_parameter_of_another_type_is_refused_with_what_was_wanted(name, wrong, wanted):
+    with pytest.raises(ConfigError, match=re.escape(wanted)):
+        preset(name, **wrong)
+
+
+def test_parameters_may_be_numbers_of_numpy_and_none_where_the_family_says_so():
+    assert preset("hks", k=np.int64(20), first=None).k == 20
+    assert preset("acd", alpha=5).alpha == 5
 
 
 def test_a_family_that_cannot_be_evaluated_is_none():

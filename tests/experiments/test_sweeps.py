@@ -77,6 +77,18 @@ def test_jobs_are_compared_by_what_is_asked_for(sweep):
         write_sweep_report(sweep, sweep / "x.html", "age/c")
 
 
+def test_the_page_warns_of_choosing_by_test_errors_and_claims_nothing_of_values_tried_once(tmp_path):
+    for name, ks, held_out, tested in (("0", 32, 0.2, 0.1), ("1", 64, 0.1, 0.3)):
+        write_job(tmp_path, name, [f"model.ks={ks}"], **{"val/age": held_out, "age/a": tested})
+    assert write_sweep_report(tmp_path, tmp_path / "a.html").name == "1", "held-out shapes decide, where there are some"
+    assert write_sweep_report(tmp_path, tmp_path / "b.html", "age/a").name == "0"
+    first, second = ((tmp_path / page).read_text() for page in ("a.html", "b.html"))
+    assert "errors of test shapes" in second
+    assert "errors of test shapes" not in first
+    assert "each value was tried once" in first
+    assert "100 %" not in first
+
+
 def test_what_is_no_sweep_is_named(tmp_path):
     with pytest.raises(DataError, match=r"there are no jobs with result\.json; wanted the folder of a sweep"):
         read_sweep(tmp_path)

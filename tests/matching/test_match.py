@@ -99,7 +99,7 @@ def test_a_network_that_knows_such_shapes_less_than_its_input_is_warned_of(meshe
     known, mixed = torch.tensor(ball.vertices), torch.tensor(ball.vertices[:1]).repeat(ball.n_vertices, 1)
     lost = Described(ball, mixed + 1e-6 * known, given=known)
     (said,) = _against_input(lost, lost.__class__(ball, mixed, given=known))
-    assert "try without the network" in said
+    assert "a match without the network" in said
     assert "100 %" in said
     good = Described(ball, known, given=known)
     assert _against_input(good, good) == []

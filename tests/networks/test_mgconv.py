@@ -85,7 +85,8 @@ def test_whole_operators_drop_nothing_whatever_the_stencil_does(dense, monkeypat
     """They are what a graphics card multiplies with; blocks of rows that do not divide the vertices are no matter."""
     monkeypatch.setattr(mgconv, "WHOLE_ROWS", 50)
     x = functions().requires_grad_()
-    assert MESH.n_vertices % 50 and MESH.n_vertices > 50
+    assert MESH.n_vertices > 50
+    assert MESH.n_vertices % 50
     averages = operators(0.3, whole=True).averages(x)
     torch.testing.assert_close(averages, torch.einsum("snm,mc->nsc", dense, x), rtol=1e-5, atol=1e-5)
     upstream = torch.randn_like(averages)

@@ -7,8 +7,9 @@ import pytest
 
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
-from csm.viewer.camera import View, body_axes, guess_up, project, rotation
+from csm.viewer.camera import View, body_axes, guess_up, project, rotation, turned_alike
 from tests.shapes import blob, cylinder, sphere
+from tests.shapes import rotation as turn
 
 
 @pytest.mark.parametrize("up", ["x", "y", "z"])
@@ -31,6 +32,30 @@ def test_body_axes_are_the_viewer_s_at_rest(up: str) -> None:
     axes = body_axes(sphere(1), up)
     np.testing.assert_allclose(axes, rotation(sphere(1), View(up=up, elevation=0)), atol=1e-12)
     assert np.linalg.det(axes) == pytest.approx(1)
+
+
+def test_a_mesh_that_lies_or_looks_elsewhere_is_seen_as_its_partner_is() -> None:
+    reference = blob(3)
+    order = np.random.default_rng(0).permutation(reference.n_vertices)
+    mesh = Mesh(3 * reference.vertices[order] @ turn(1).T + 7, np.argsort(order)[reference.faces])
+    axes = body_axes(reference, "y")
+    order[5] = -1
+    found = turned_alike(mesh, order, reference, axes)
+    assert np.linalg.det(found) == pytest.approx(1)
+    seen, wanted = (mesh.vertices - 7) @ found.T / 3, reference.vertices @ axes.T
+    np.testing.assert_allclose(seen[order >= 0], wanted[order[order >= 0]], atol=0.02)
+
+
+@pytest.mark.parametrize("partners", ["none", "two", "one for all", "drawn"])
+def test_without_a_map_to_believe_a_mesh_stands_by_itself(partners: str) -> None:
+    mesh = cylinder()
+    indices = np.full(mesh.n_vertices, -1 if partners in ("none", "two") else 0)
+    if partners == "two":
+        indices[:2] = [3, 4]
+    if partners == "drawn":
+        indices = np.random.default_rng(0).permutation(mesh.n_vertices)
+    found = turned_alike(mesh, indices, mesh, body_axes(mesh, "x"))
+    np.testing.assert_array_equal(found, body_axes(mesh, "auto"))
 
 
 def test_the_whole_shape_fits_with_a_margin_and_is_centred() -> None:

@@ -81,6 +81,11 @@ class Refined(Matcher):
         """Names of both, with a plus sign between them."""
         return f"{self.matcher.name}+{self.refiner.name}"
 
+    @property
+    def by_classifier(self) -> bool:  # type: ignore[override]
+        """Whether its matcher needs a classifier."""
+        return self.matcher.by_classifier
+
     def __call__(self, source: Described, target: Described, at: IntArray | None = None) -> VertexMap:
         """Return the refined map, of all vertices whatever is asked for: a refinement needs all of them."""
         return self.refiner(start_of(self.matcher, source, target), source, target).forward.vertex_map
