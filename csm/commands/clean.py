@@ -15,7 +15,7 @@ from omegaconf import DictConfig
 from csm._counts import counted
 from csm.commands.app import command, write_json
 from csm.commands.outputs import OVERWRITE, require_file_place, require_new_in_sweep
-from csm.errors import ConfigError, MeshError
+from csm.errors import ConfigError
 from csm.evaluation.provenance import provenance
 from csm.mesh.check import check
 from csm.mesh.clean import Cleaned, clean
@@ -38,8 +38,6 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     done = clean(
         mesh, weld=cfg.weld, split=cfg.split, debris=cfg.debris, orient=cfg.orient, tolerance=float(cfg.tolerance)
     )
-    if not done.mesh.n_faces:
-        raise MeshError(f"{source}: nothing is left of it, since no face has an area; {target} is not written")
     write_cleaned(done, source, target, len(mesh.sizes))
     report(done, source, target)
     return {"vertices": done.mesh.n_vertices, "faces": done.mesh.n_faces, "steps": len(done.mends)}

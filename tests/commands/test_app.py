@@ -119,7 +119,7 @@ def test_clean_writes_nothing_where_nothing_is_left(csm, tmp_path):
     (tmp_path / "point.off").write_text("OFF\n3 1 0\n1 1 1\n1 1 1\n1 1 1\n3 0 1 2\n")
     status, _, error = csm("clean", "point.off", "clean.ply")
     assert status == 2
-    assert "point.off: nothing is left of it" in error
+    assert "point.off: its only face vanishes" in error
     assert [path.name for path in tmp_path.glob("clean*")] == []
 
 
@@ -146,7 +146,7 @@ def test_describe_gives_rows_for_the_vertices_of_the_file(csm, tmp_path):
     status, out, _ = csm("describe", "a.off", "d.npz", "descriptor=gps", "descriptor.k=20")
     assert status == 0
     assert "1 vertex in no face" in out
-    assert str(np.load(tmp_path / "d.npz")["preset"]) == ""
+    assert str(np.load(tmp_path / "d.npz")["preset"]) == "gps"
     values = np.load(tmp_path / "d.npz")["values"]
     assert np.isnan(values).all(axis=1).sum() == 1
     assert len(values) == 830
