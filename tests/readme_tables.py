@@ -21,6 +21,7 @@ MEASURED = {
     "work": ("", "{}"),
     "variant": ("", "{}"),
     "vertices": ("vertices", "{:,}"),
+    "classes": ("template points", "{:,}"),
     "reference_ms": ("reference ms", "{:.0f}"),
     "csm_ms": ("csm ms", "{:.0f}"),
     "milliseconds": ("ms", "{:.0f}"),
@@ -38,6 +39,7 @@ MEASURED = {
     "solve_share": ("solve %", "{:.0f}"),
     "check_share": ("check %", "{:.0f}"),
     "megabytes": ("MB", "{:.0f}"),
+    "logits": ("MB of all scores", "{:.0f}"),
     "wrong": ("wrong partners", "{:.4f}"),
 }
 """What the rows of benchmarks have -> title of the column, and how its numbers are written; other things stay out."""
