@@ -31,7 +31,7 @@ MEASURED = {
     "processor_seconds": ("processor s", "{:.1f}"),
     "ratio": ("ratio", "{:.2f}"),
     "speedup": ("ratio", "{:.2f}"),
-    "goal": ("goal", "{:.3g}"),
+    "goal": ("goal", "{:.4g}"),
     "pairs": ("pairs", "{}"),
     "error": ("error", "{:.1f}"),
     "rest": ("rest of the step %", "{:.0f}"),
