@@ -125,6 +125,9 @@ class FolderSet:
     missing: tuple[Missing, ...] = ()
     extras: tuple[Path, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"FolderSet({self.name!r}, {counted(len(self.entries), 'shape')}, {str(self.root)!r})"
+
     @property
     def names(self) -> tuple[str, ...]:
         """Names of all shapes, in natural order."""

@@ -181,9 +181,8 @@ def _page(collection: MatchedCollection, viewer: Viewer) -> str:
 def verdict(collection: MatchedCollection) -> str:
     """Return a sentence on how well the maps of the pairs agreed before they were made to agree."""
     edges = collection.edges
-    said = (
-        f"{len(edges) - len(collection.mended)} of {counted(len(edges), 'map')} of single pairs agree with all others"
-    )
+    agreeing = len(edges) - len(collection.mended)
+    said = f"the maps of {agreeing} of {counted(len(edges), 'pair')} agree with those of all others"
     replaced = counted(len(collection.mended), "was", "were")
     mended = f"; the other {replaced} replaced by what the others say" if collection.mended else ""
     return f"{_agreement(collection, said, mended)}{_untrusted(collection)}"

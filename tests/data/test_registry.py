@@ -62,7 +62,9 @@ def test_a_set_is_found_by_its_name_first_name_first(tmp_path):
     made.shrec19(tmp_path / "b")
     assert find_set(tmp_path, "SHREC19_5k_remeshed", "TOSCA_5k_remeshed").root == tmp_path / "b"
     assert find_set(tmp_path, "FAUST_6890", "TOSCA_5k_remeshed").root == tmp_path / "a"
-    assert find_set(tmp_path / "b", "SHREC19_5k_remeshed").names == ("1", "2", "10")
+    found = find_set(tmp_path / "b", "SHREC19_5k_remeshed")
+    assert found.names == ("1", "2", "10")
+    assert repr(found) == f"FolderSet('SHREC19_5k_remeshed', 3 shapes, {str(tmp_path / 'b')!r})"
     with pytest.raises(DataError, match="wanted SCAPE_5000, but there are SHREC19_5k_remeshed, TOSCA_5k_remeshed"):
         find_set(tmp_path, "SCAPE_5000")
     with pytest.raises(DataError, match="wanted SCAPE_5000, but no published set was recognised there"):

@@ -31,7 +31,7 @@ def test_everything_is_written_and_accounted_for(found, tmp_path):
     assert files(out) == {*wanted, "collection.json"}
     assert set(account["files"]) == wanted
     assert account["reference"] == found.reference
-    assert account["verdict"] == verdict(found) == "3 of 3 maps of single pairs agree with all others"
+    assert account["verdict"] == verdict(found) == "the maps of 3 of 3 pairs agree with those of all others"
     assert [pair["source"] for pair in account["pairs"]] == ["s0", "s0", "s1"]
     other = next(name for name in found.names if name != found.reference)
     read = np.loadtxt(out / f"maps/{other}_to_{found.reference}.txt", dtype=int)
