@@ -5,6 +5,7 @@ A descriptor is a frozen dataclass: its fields are its parameters, and calling i
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
@@ -58,11 +59,21 @@ class Features:
         return f"Features({counted(n, 'vertex')}, {counted(q, 'column')}: {' ... '.join(ends)})"
 
 
-_KINDS: Mapping[str, tuple[type, str]] = {
-    "int": (Integral, "a whole number"),
-    "float": (Real, "a number"),
-    "bool": (bool, "true or false"),
+_WANTED = {
+    "int": "a whole number",
+    "float": "a finite number",
+    "bool": "true or false",
+    "tuple[float, ...]": "a list of finite numbers",
 }
+"""Annotations of parameters that are checked, and what is wanted of them."""
+
+
+def _is_kind(value: Any, kind: str) -> bool:
+    if kind == "tuple[float, ...]":
+        return isinstance(value, list | tuple) and all(_is_kind(each, "float") for each in value)
+    if kind == "bool" or isinstance(value, bool):
+        return kind == "bool" and isinstance(value, bool)
+    return isinstance(value, Integral) if kind == "int" else isinstance(value, Real) and math.isfinite(value)
 
 
 @dataclass(frozen=True)
@@ -92,15 +103,19 @@ class Descriptor(ABC):
     by_component: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        """Raise a ConfigError if a parameter is no number where its annotation is one; families check more."""
+        """Raise a ConfigError if a parameter is not of the kind of its annotation; families check more.
+
+        Numbers of other libraries become Python's, which can be written to files.
+        """
         for field in fields(self):
             kind, _, rest = str(field.type).partition(" | ")
-            accepted, wanted = _KINDS.get(kind, (object, ""))
             value = getattr(self, field.name)
-            if isinstance(value, accepted) and not (isinstance(value, bool) and accepted in (Integral, Real)):
+            if kind not in _WANTED or (value is None and rest == "None"):
                 continue
-            if not (value is None and rest == "None"):
-                raise ConfigError(f"{self.name}: {field.name}={value!r}; wanted {wanted}")
+            if not _is_kind(value, kind):
+                raise ConfigError(f"{self.name}: {field.name}={value!r}; wanted {_WANTED[kind]}")
+            if kind in ("int", "float") and not isinstance(value, int | float):
+                object.__setattr__(self, field.name, int(value) if kind == "int" else float(value))
 
     @property
     def eigenpairs(self) -> int:

@@ -121,7 +121,7 @@ def preset(name: str, **overrides: Any) -> Descriptor:
     >>> preset("acd")(csm.read_mesh("tr_reg_000.off"))  # doctest: +SKIP
     Features(6890 vertices, 640 columns: theta=0.000 K=11 T0 ... theta=2.985 K=8 T7)
     """
-    if name not in PRESETS:
+    if not isinstance(name, str) or name not in PRESETS:
         raise ConfigError(f"there is no descriptor {name!r}; there are {', '.join(PRESETS)}")
     descriptor = PRESETS[name]
     known = [field.name for field in fields(descriptor)]

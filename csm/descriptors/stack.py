@@ -43,6 +43,9 @@ class Stack(Descriptor):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        named = isinstance(self.parts, Mapping) and all(isinstance(part, Descriptor) for part in self.parts.values())
+        if not named:
+            raise ConfigError(f"stack: parts={self.parts!r}; wanted descriptors by name")
         object.__setattr__(self, "parts", dict(self.parts))
         if not self.parts:
             raise ConfigError("a stack needs at least one descriptor")

@@ -159,7 +159,7 @@ def require_same_settings(path: Path, module: CSMModule, epochs: int | None = No
         )
     if epochs is not None and (done := epochs_done(read)) > epochs >= 0:
         raise ConfigError(
-            f"{path}: {done} epochs are done there, trainer.max_epochs={epochs} wants fewer; ask for {done}, or "
+            f"{path}: {done} epochs are done there, trainer.max_epochs={epochs} wants fewer; ask for more, or "
             "begin anew (resume=null, or another folder)"
         )
 

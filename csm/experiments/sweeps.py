@@ -59,11 +59,11 @@ class SweepJob:
     overrides: tuple[str, ...] = ()
 
     def value(self, quantity: str) -> float | None:
-        """Return a quantity of the job: a number that it returned, or `MEAN_ERROR`; None if it has none."""
-        if quantity == MEAN_ERROR:
-            errors = [value for name, value in self.numbers.items() if name.startswith("age/")]
-            return fmean(errors) if errors else None
-        return self.numbers.get(quantity)
+        """Return a quantity of the job: a finite number that it returned, or `MEAN_ERROR`; None if it has none."""
+        wanted = [name for name in self.numbers if name.startswith("age/")] if quantity == MEAN_ERROR else [quantity]
+        values = [self.numbers.get(name, np.nan) for name in wanted]
+        found = fmean(values) if values else np.nan
+        return found if np.isfinite(found) else None
 
 
 def read_sweep(folder: Path) -> list[SweepJob]:
@@ -198,10 +198,9 @@ def write_sweep_report(folder: Path, out: Path, by: str | None = None) -> SweepJ
         (job for job in jobs if job.value(quantity) is not None), key=lambda job: float(job.value(quantity) or 0)
     )
     if not ranked:
-        known = sorted({name for job in jobs for name in job.numbers})
-        raise ConfigError(
-            f"{folder}: no job has {quantity or MEAN_ERROR!r}; there are {', '.join(known) or 'no numbers'}"
-        )
+        known = ", ".join(sorted({name for job in jobs for name in job.numbers})) or "no numbers"
+        failed = "" if any(job.status == "ok" for job in jobs) else f"; all jobs failed, the first: {jobs[0].error}"
+        raise ConfigError(f"{folder}: no job has {quantity or MEAN_ERROR!r}; there are {known}{failed}")
     best, rest = ranked[0], [job for job in jobs if job not in ranked]
     sections = [
         Section("The best", [Text(_best_in_words(ranked, quantity)), Code(_command(best))]),

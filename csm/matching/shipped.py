@@ -16,7 +16,7 @@ def shipped_models() -> list[str]:
     Examples
     --------
     >>> shipped_models()
-    ['humans']
+    ['humans', 'humans_parts']
     """
     return sorted(path.parent.name for path in FOLDER.glob(f"*/{_SETTINGS}"))
 

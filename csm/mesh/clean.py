@@ -216,7 +216,7 @@ class _Work:
         self._did("faces", count, "face", "left out: corners that coincide, or a face twice")
 
     def require_faces(self, mesh: Mesh | PolygonMesh) -> None:
-        if not len(self.faces):
+        if not len(self.faces) or flat_faces(Mesh(self.vertices, self.faces)).all():
             n = len(mesh.faces) if isinstance(mesh, Mesh) else len(mesh.sizes)
             every = "its only face vanishes" if n == 1 else f"all of its {n} faces vanish"
             raise MeshError(f"{mesh.label}: {every}: corners coincide or lie on a line; no surface is left")

@@ -21,7 +21,7 @@ MODES = {
 _ALWAYS = ("matched", "checker", "stripes", "plain")
 _STOPS = 12
 _HELP = (
-    "Meshes stand as their partners do, whichever way their files have it. Drag, or one finger: turn. Shift-drag, or "
+    "Meshes stand as their partners do, where the map lets them. Drag, or one finger: turn. Shift-drag, or "
     "two fingers: move. Wheel on a mesh that was clicked, or two fingers apart: zoom. Point at a mesh to see the "
     "partner of a vertex; click or tap to pin it. Keys: arrows turn, + and - zoom, 0 is the first view, the other "
     "numbers choose what the colours show, Enter pins the middle of the mesh, Escape unpins. A broken ring lies behind "

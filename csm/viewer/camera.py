@@ -67,7 +67,7 @@ def body_axes(mesh: Mesh, up: Axis | Literal["auto"]) -> FloatArray:
     return np.stack([right, upward, np.cross(right, upward)])
 
 
-def turned_alike(mesh: Mesh, to_reference: IntArray, reference: Mesh, axes: FloatArray) -> FloatArray:
+def turned_alike(mesh: Mesh, to_reference: IntArray, reference: Mesh, up: Axis | Literal["auto"]) -> FloatArray:
     """Return axes of a mesh with which it is seen as another is with its own, whichever way the files have them stand.
 
     Parameters
@@ -78,26 +78,27 @@ def turned_alike(mesh: Mesh, to_reference: IntArray, reference: Mesh, axes: Floa
         Shape (N,), the vertex of the reference that each vertex is mapped to, or -1.
     reference
         The other mesh.
-    axes
-        Those of the reference, as `body_axes` returns them.
+    up
+        Axis that points up, as in `body_axes`: of the reference, and of a mesh that no rotation brings near to it, as
+        where the map is wrong.
 
     Returns
     -------
     FloatArray
-        Shape (3, 3): `axes` turned by the rotation that brings the vertices nearest to their partners, both at one size
-        around their middles; those of `body_axes` where no rotation brings them near, as of a map that is wrong.
+        Shape (3, 3): the reference's `body_axes`, turned by the rotation that brings the vertices nearest to their
+        partners, both at one size around their middles.
     """
     known = np.flatnonzero(to_reference >= 0)
     here, there = mesh.vertices[known], reference.vertices[to_reference[known]]
     here, there = (points - points.mean(axis=0) for points in (here, there)) if known.size else (here, there)
     sizes = np.linalg.norm(here), np.linalg.norm(there)
     if known.size < 3 or not min(sizes) > 0:
-        return body_axes(mesh, "auto")
+        return body_axes(mesh, up)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of flat meshes, which any of several rotations suits
         found, apart = Rotation.align_vectors(there / sizes[1], here / sizes[0])
-    turned: FloatArray = axes @ found.as_matrix()
-    return turned if 1 - apart**2 / 2 >= _ALIKE else body_axes(mesh, "auto")
+    turned: FloatArray = body_axes(reference, up) @ found.as_matrix()
+    return turned if 1 - apart**2 / 2 >= _ALIKE else body_axes(mesh, up)
 
 
 def rotation(mesh: Mesh, view: View) -> FloatArray:

@@ -185,7 +185,7 @@ def _axes(panel: Panel, viewer: Viewer) -> FloatArray:
     reference, up = viewer.panels[viewer.reference].mesh, viewer.view.up
     if panel.to_reference is None or panel.mesh is reference:
         return body_axes(panel.mesh, up)
-    return turned_alike(panel.mesh, panel.to_reference, reference, body_axes(reference, up))
+    return turned_alike(panel.mesh, panel.to_reference, reference, up)
 
 
 def _panel_data(panel: Panel, viewer: Viewer) -> dict[str, Any]:

@@ -162,7 +162,11 @@ def test_a_family_states_its_fields_and_gets_the_rest():
         ("hks", {"k": "3"}, "hks: k='3'; wanted a whole number"),
         ("wks", {"n_energies": 2.5}, "wks: n_energies=2.5; wanted a whole number"),
         ("acd", {"k": True}, "acd: k=True; wanted a whole number"),
-        ("acd", {"alpha": None}, "acd: alpha=None; wanted a number"),
+        ("acd", {"alpha": None}, "acd: alpha=None; wanted a finite number"),
+        ("acd", {"alpha": float("inf")}, "acd: alpha=inf; wanted a finite number"),
+        ("lps", {"radii": 3}, "lps: radii=3; wanted a list of finite numbers"),
+        ("lps", {"radii": ["a"]}, "lps: radii=['a']; wanted a list of finite numbers"),
+        ("acd_two_bands", {"parts": {"a": 3}}, "stack: parts={'a': 3}; wanted descriptors by name"),
         ("acd", {"normalise": "yes"}, "acd: normalise='yes'; wanted true or false"),
     ],
 )
@@ -172,8 +176,9 @@ def test_a_parameter_of_another_type_is_refused_with_what_was_wanted(name, wrong
 
 
 def test_parameters_may_be_numbers_of_numpy_and_none_where_the_family_says_so():
-    assert preset("hks", k=np.int64(20), first=None).k == 20
-    assert preset("acd", alpha=5).alpha == 5
+    assert json.loads(json.dumps(preset("hks", k=np.int64(20), first=None).parameters()))["k"] == 20
+    assert json.loads(json.dumps(preset("acd", alpha=np.float32(5)).parameters()))["alpha"] == 5
+    assert type(preset("acd", alpha=5).alpha) is int
 
 
 def test_a_family_that_cannot_be_evaluated_is_none():

@@ -89,6 +89,17 @@ def test_the_page_warns_of_choosing_by_test_errors_and_claims_nothing_of_values_
     assert "100 %" not in first
 
 
+def test_a_job_without_a_finite_error_is_not_the_best_and_failures_are_told(tmp_path):
+    write_job(tmp_path, "0", ["seed=0"], **{"age/a": float("nan")})
+    with pytest.raises(ConfigError, match="no job has"):
+        write_sweep_report(tmp_path, tmp_path / "a.html")
+    write_job(tmp_path, "1", ["seed=1"], **{"age/a": 0.1})
+    assert write_sweep_report(tmp_path, tmp_path / "a.html").name == "1"
+    write_job(tmp_path / "failed", "0", ["seed=0"], status="failed", error="no memory")
+    with pytest.raises(ConfigError, match="all jobs failed, the first: no memory"):
+        write_sweep_report(tmp_path / "failed", tmp_path / "b.html")
+
+
 def test_what_is_no_sweep_is_named(tmp_path):
     with pytest.raises(DataError, match=r"there are no jobs with result\.json; wanted the folder of a sweep"):
         read_sweep(tmp_path)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from csm.errors import ConfigError
+from csm.errors import ConfigError, MeshError
 from csm.mesh.check import check
 from csm.mesh.clean import clean
 from csm.mesh.io import read_mesh, read_polygons
@@ -106,6 +106,16 @@ def test_vertices_with_flat_faces_only_are_joined_with_a_neighbour():
     done = clean(Mesh(spike, faces))
     assert done.vertex_map[36] == done.vertex_map[14]
     assert not [f for f in check(done.mesh) if f.severity == "error"]
+
+
+@pytest.mark.parametrize(
+    ("faces", "said"),
+    [([[0, 1, 1], [2, 2, 0]], "all of its 2 faces vanish"), ([[0, 1, 2]], "its only face vanishes")],
+)
+def test_a_mesh_of_which_no_surface_is_left_is_refused_with_the_reason(faces, said):
+    line = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
+    with pytest.raises(MeshError, match=said):
+        clean(Mesh(line, np.array(faces)))
 
 
 def test_labels_carry_over():
