@@ -99,7 +99,8 @@ def require_own_archive(path: Path, arrays: Iterable[str], overwrite: bool) -> N
 
 def _is_own_archive(path: Path, arrays: Iterable[str]) -> bool:
     with np.load(path, allow_pickle=False) as archive:
-        return set(arrays) <= set(archive.files) and str(archive["checksum"]) == checksum(archive["values"])
+        known = set(archive.files) - {"preset"}  # which archives of older versions lack
+        return known == set(arrays) and str(archive["checksum"]) == checksum(archive["values"])
 
 
 def checksum(values: NDArray[Any]) -> str:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from numbers import Integral, Real
 from typing import Any, ClassVar
@@ -70,7 +70,8 @@ _WANTED = {
 
 def _is_kind(value: Any, kind: str) -> bool:
     if kind == "tuple[float, ...]":
-        return isinstance(value, list | tuple) and all(_is_kind(each, "float") for each in value)
+        several = isinstance(value, Sequence) and not isinstance(value, str)
+        return several and all(_is_kind(each, "float") for each in value)
     if kind == "bool" or isinstance(value, bool):
         return kind == "bool" and isinstance(value, bool)
     return isinstance(value, Integral) if kind == "int" else isinstance(value, Real) and math.isfinite(value)

@@ -110,6 +110,11 @@ def resume_point(folder: Path, resume: Path | str | None) -> Path | None:
     if resume is None:
         return None
     if resume != AUTO:
+        if Path(resume).suffix in (".json", ".safetensors"):
+            raise DataError(
+                f"{resume}: an export has the weights alone, and a training goes on from a checkpoint such as "
+                f"{last_checkpoint(Path('FOLDER'))}; pretrained={resume} begins another with these weights"
+            )
         read_checkpoint(Path(resume))
         return Path(resume)
     last = last_checkpoint(folder)
@@ -152,7 +157,7 @@ def require_same_settings(path: Path, module: CSMModule, epochs: int | None = No
     if epochs is not None and module.schedule in _FIXED_LENGTH and kept.get("training.epochs") not in (None, epochs):
         changed.append("training.epochs")
     if changed:
-        told = "; ".join(f"{key}: {kept.get(key)} there, {wanted.get(key)} wanted" for key in changed)
+        told = "; ".join(f"{_called(key)}: {kept.get(key)} there, {wanted.get(key)} wanted" for key in changed)
         raise ConfigError(
             f"{path}: was trained with other settings ({told}); go on with those, or begin anew (resume=null, or "
             "another folder)"
@@ -162,6 +167,10 @@ def require_same_settings(path: Path, module: CSMModule, epochs: int | None = No
             f"{path}: {done} epochs are done there, trainer.max_epochs={epochs} wants fewer; ask for more, or "
             "begin anew (resume=null, or another folder)"
         )
+
+
+def _called(key: str) -> str:
+    return "trainer.max_epochs, over which the schedule is laid out" if key == "training.epochs" else key
 
 
 def epochs_done(checkpoint: Mapping[str, Any]) -> int:

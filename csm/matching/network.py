@@ -95,7 +95,8 @@ def load_model(path: str | os.PathLike[str], name: str = "") -> NetworkMethod:
     Parameters
     ----------
     path
-        "humans" or "humans_parts", which csm brings (`csm.matching.shipped`), or a file such as ``outputs/train/DATE/model.ckpt``.
+        "humans" or "humans_parts", which csm brings (`csm.matching.shipped`), or a file such as
+        ``outputs/train/DATE/model.ckpt``.
     name
         What tables call it; by default what its training was called.
 

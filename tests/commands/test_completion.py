@@ -19,7 +19,7 @@ from csm.commands.main import COMMANDS
         ("csm compl", ["completion"]),
         ("csm completion z", ["zsh"]),
         ("csm match a.off b.off refi", ["refine="]),
-        ("csm match a.off b.off model=h", ["model=humans"]),
+        ("csm match a.off b.off model=h", ["model=humans", "model=humans_parts"]),
         ("csm match a.off b.off refine=multi", ["refine=multistart"]),
         ("csm train recipe=ow", ["recipe=own"]),
         ("csm train learning.stand", ["learning.standardise="]),

@@ -115,11 +115,16 @@ def test_other_settings_are_refused_with_what_differs(tmp_path, whole):
     path = whole.checkpoint
     one = training(tmp_path)
     require_same_settings(path, make_module(one, 16, EPOCHS), EPOCHS)
-    with pytest.raises(ConfigError, match=r"training\.epochs: 4 there, 9 wanted"):
+    with pytest.raises(ConfigError, match=r"trainer\.max_epochs, over which the schedule is laid out: 4 there, 9 w"):
         require_same_settings(path, make_module(one, 16, 9), 9)
     other = a_training(tmp_path, network=NETWORK | {"ks": 12, "dropout": 0.3}, options=RANDOM["options"], seed=1)
     with pytest.raises(ConfigError, match=r"network\.ks: \d+ there, 12 wanted; training\.seed: 0 there, 1 wanted"):
         require_same_settings(path, make_module(other, 16, EPOCHS), EPOCHS)
+
+
+def test_an_export_is_not_gone_on_from(tmp_path):
+    with pytest.raises(DataError, match=r"an export has the weights alone.*pretrained=.*model\.json begins another"):
+        resume_point(tmp_path, tmp_path / "export" / "model.json")
 
 
 def test_two_trainings_in_one_folder_are_refused(tmp_path):
