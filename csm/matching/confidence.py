@@ -203,7 +203,13 @@ def share_returning(source: Mesh, at: IntArray, here: NDArray[Any] | Tensor, the
     return float((away < NEAR * np.sqrt(body_of(source).area)).mean())
 
 
+def returning_both_ways(source: Described, target: Described) -> tuple[float, float]:
+    """Return how many nearest neighbours of samples of the source return to their place, and how many of the target."""
+    ways = ((source, target), (target, source))
+    forth, back = (share_returning(here.mesh, here.order[:SAMPLES], here.rows, there.rows) for here, there in ways)
+    return forth, back
+
+
 def returning(source: Described, target: Described) -> float:
     """Return how many nearest neighbours return to their place, of the shape where fewer do."""
-    ways = ((source, target), (target, source))
-    return min(share_returning(here.mesh, here.order[:SAMPLES], here.rows, there.rows) for here, there in ways)
+    return min(returning_both_ways(source, target))

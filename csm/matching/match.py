@@ -16,6 +16,7 @@ from csm.matching.confidence import share_returning
 from csm.matching.maps import VertexMap
 from csm.matching.methods import Method, PrecomputedMethod, as_method, describe_all, require_classifier
 from csm.matching.nearest import nearest
+from csm.matching.parts import likely_part
 from csm.matching.refinement.base import Refined, Refiner
 from csm.matching.registry import matchers as as_matchers
 from csm.matching.result import Match
@@ -25,7 +26,6 @@ from csm.matching.subjects import Cleaning, Subject, on_given, subject_of
 from csm.matching.suited import AUTO, suited
 from csm.mesh.debris import body_of
 from csm.mesh.inputs import MeshLike
-from csm.mesh.topology import rim
 
 
 def match(
@@ -146,12 +146,12 @@ def _compared(source: Subject, target: Subject) -> list[str]:
     """Say what makes two shapes hard to compare: one open and one closed, several components, very few vertices."""
     said = []
     meshes = [subject.cleaned.mesh for subject in (source, target)]
-    rims = [rim(mesh.vertices, mesh.faces) / float(np.sqrt(mesh.area)) for mesh in meshes]
-    open_one = int(rims[1] > rims[0])
-    if rims[open_one] > 0.3 and rims[1 - open_one] < 0.1:
+    open_one = likely_part(*meshes)
+    if open_one is not None:
         said.append(
             f"{meshes[open_one].label} is open, {meshes[1 - open_one].label} is closed: if one is a part of the other, "
-            "what is missing has no partner, and spectra of a part differ from those of the whole, so expect a poor map"
+            "what is missing has no partner, and spectra of a part differ from those of the whole, so expect a poor "
+            "map, but of a network that knows parts (of human bodies: model=humans_parts)"
         )
     parts = [body_of(mesh).n_components for mesh in meshes]
     if parts[0] != parts[1]:

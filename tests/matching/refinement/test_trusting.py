@@ -13,6 +13,7 @@ from csm.matching.refinement.joint import Joint
 from csm.matching.refinement.multistart import Multistart
 from csm.matching.refinement.trusting import Trusting
 from csm.matching.way import Way
+from csm.mesh.perturb import without_part
 from tests.shapes import blob
 
 
@@ -62,7 +63,27 @@ def test_a_refined_map_that_returns_better_than_the_start_is_taken_whole(pair, m
     assert (found.forward is way) == (said == "refined throughout")
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_part_that_returns_keeps_its_neighbours_and_is_not_searched_for(monkeypatch, turned):
+    """What the whole has more cannot return, which says nothing against the start."""
+    whole = blob(3)
+    cut = without_part(whole, 0, 0.3)
+    shapes = [Described(mesh, torch.tensor(mesh.vertices)) for mesh in (cut.mesh, whole)]
+    source, target = shapes[::-1] if turned else shapes
+    monkeypatch.setattr(
+        Multistart, "__call__", lambda *_: RefinedMap(Way(VertexMap(np.zeros(1, int), 1)), text="search")
+    )
+    found = Trusting()(VertexMap(np.zeros(source.mesh.n_vertices, int), target.mesh.n_vertices), source, target)
+    to_whole = found.backward if turned else found.forward
+    np.testing.assert_array_equal(to_whole.vertex_map.indices, cut.kept)
+    assert "100 % of the nearest neighbours of" in found.text
+    assert "kept as they are" in found.text
+    odd = Described(cut.mesh, noisy(shapes[0], 0.5).features)
+    assert "searched for" in Trusting()(VertexMap(np.zeros(len(cut.kept), int), whole.n_vertices), odd, shapes[1]).text
+
+
 @pytest.mark.parametrize("share", [-0.1, 1.1, float("nan")])
 def test_a_share_is_between_0_and_1(share):
-    with pytest.raises(ConfigError, match="wanted a share from 0 to 1"):
-        Trusting(returning=share)
+    for option in ("returning", "of_part"):
+        with pytest.raises(ConfigError, match="wanted shares from 0 to 1"):
+            Trusting(**{option: share})
