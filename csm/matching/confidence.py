@@ -208,8 +208,3 @@ def returning_both_ways(source: Described, target: Described) -> tuple[float, fl
     ways = ((source, target), (target, source))
     forth, back = (share_returning(here.mesh, here.order[:SAMPLES], here.rows, there.rows) for here, there in ways)
     return forth, back
-
-
-def returning(source: Described, target: Described) -> float:
-    """Return how many nearest neighbours return to their place, of the shape where fewer do."""
-    return min(returning_both_ways(source, target))

@@ -6,7 +6,7 @@ import torch
 
 from csm.errors import ConfigError
 from csm.matching.base import Described
-from csm.matching.confidence import returning
+from csm.matching.confidence import returning_both_ways
 from csm.matching.maps import VertexMap
 from csm.matching.refinement.base import RefinedMap
 from csm.matching.refinement.joint import Joint
@@ -34,10 +34,12 @@ def noisy(described: Described, share: float) -> Described:
     return Described(described.mesh, features)
 
 
-def test_the_share_is_that_of_the_worse_way(pair):
-    assert returning(*pair) == 1
+def test_the_shares_are_those_of_both_ways(pair):
+    assert returning_both_ways(*pair) == (1, 1)
     here, there = pair[0], noisy(pair[1], 0.3)
-    assert returning(here, there) == returning(there, here) < 0.97
+    shares = returning_both_ways(here, there)
+    assert shares == returning_both_ways(there, here)[::-1]
+    assert min(shares) < 0.97
 
 
 @pytest.mark.parametrize(("share", "chosen", "said"), [(0.0, "joint", "kept"), (0.3, "search", "searched for")])
