@@ -16,7 +16,7 @@ from csm.matching.confidence import share_returning
 from csm.matching.maps import VertexMap
 from csm.matching.methods import Method, PrecomputedMethod, as_method, describe_all, require_classifier
 from csm.matching.nearest import nearest
-from csm.matching.parts import likely_part
+from csm.matching.parts import KNOWS_PARTS, likely_part
 from csm.matching.refinement.base import Refined, Refiner
 from csm.matching.registry import matchers as as_matchers
 from csm.matching.result import Match
@@ -105,7 +105,7 @@ def match_of(
     source, target = subjects
     forward, backward = on_given(found.forward, source, target), on_given(found.backward, target, source)
     features = _on_given_rows(described[0], source), _on_given_rows(described[1], target)
-    notes = (*filter(None, [why]), *_notes(source, target), *_against_input(*described))
+    notes = (*filter(None, [why]), *_notes(source, target, method.name), *_against_input(*described))
     return Match(source.given, target.given, forward, backward, method, matcher, notes, found.text, features)
 
 
@@ -137,21 +137,21 @@ def _on_given_rows(described: Described, subject: Subject) -> Float32Array:
     return np.where(at[:, None] >= 0, rows[at], np.float32(0))
 
 
-def _notes(source: Subject, target: Subject) -> tuple[str, ...]:
+def _notes(source: Subject, target: Subject, method: str) -> tuple[str, ...]:
     said = [f"{subject.given.label}: {note}" for subject in (source, target) for note in subject.notes]
-    return tuple(dict.fromkeys([*said, *_compared(source, target)]))
+    return tuple(dict.fromkeys([*said, *_compared(source, target, method)]))
 
 
-def _compared(source: Subject, target: Subject) -> list[str]:
+def _compared(source: Subject, target: Subject, method: str) -> list[str]:
     """Say what makes two shapes hard to compare: one open and one closed, several components, very few vertices."""
     said = []
     meshes = [subject.cleaned.mesh for subject in (source, target)]
     open_one = likely_part(*meshes)
     if open_one is not None:
+        poor = "; spectra of a part differ from those of the whole, so expect a poor map; for human bodies try model="
         said.append(
-            f"{meshes[open_one].label} is open, {meshes[1 - open_one].label} is closed: if one is a part of the other, "
-            "what is missing has no partner, and spectra of a part differ from those of the whole, so expect a poor "
-            "map, but of a network that knows parts (of human bodies: model=humans_parts)"
+            f"{meshes[open_one].label} is open, {meshes[1 - open_one].label} is closed, or nearly so: if one is a part "
+            f"of the other, what is missing has no partner{'' if method == KNOWS_PARTS else poor + KNOWS_PARTS}"
         )
     parts = [body_of(mesh).n_components for mesh in meshes]
     if parts[0] != parts[1]:

@@ -7,6 +7,9 @@ import numpy as np
 from csm.mesh.shape import Mesh
 from csm.mesh.topology import rim
 
+KNOWS_PARTS = "humans_parts"
+"""The network that csm brings for human bodies of which a part may be missing."""
+
 _OPEN, _CLOSED = 0.3, 0.1  # lengths of the boundary over the root of the area
 
 

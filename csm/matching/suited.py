@@ -12,7 +12,7 @@ from csm.data.store import Store
 from csm.matching.base import Described
 from csm.matching.confidence import returning_both_ways
 from csm.matching.methods import Method, as_method, describe_all
-from csm.matching.parts import likely_part
+from csm.matching.parts import KNOWS_PARTS, likely_part
 from csm.mesh.shape import Mesh
 
 AUTO = "auto"
@@ -48,7 +48,7 @@ def suited(meshes: Sequence[Mesh], store: Store, device: str = "cpu") -> tuple[M
         The method, why it was chosen, in words, and the meshes as it describes them, if it is the network.
     """
     part = likely_part(*meshes)
-    network = as_method("humans" if part is None else "humans_parts")
+    network = as_method("humans" if part is None else KNOWS_PARTS)
     needed = network.recipe.basis_k if network.recipe else 0
     if min(mesh.n_vertices for mesh in meshes) < needed:
         why = f"model=auto: a mesh has fewer than the {needed} vertices that the network {network.name} needs"
