@@ -64,4 +64,4 @@ def suited(meshes: Sequence[Mesh], store: Store, device: str = "cpu") -> tuple[M
             described,
         )
     why += f" to their place, fewer than on human bodies, so the descriptor acd was taken; model={network.name} insists"
-    return as_method("acd"), why, []
+    return as_method("acd"), why if part is not None else f"{why}, model={KNOWS_PARTS} where a part is missing", []

@@ -21,7 +21,7 @@ def test_the_network_is_taken_where_its_neighbours_return(tmp_path, monkeypatch,
     assert method.name == name
     assert len(described) == (2 if name == "humans" else 0)
     assert why.startswith(f"model=auto: {100 * share:.0f} % of the nearest neighbours")
-    assert ("model=null" if name == "humans" else "model=humans") in why
+    assert ("model=null" if name == "humans" else "model=humans insists, model=humans_parts where a part is") in why
 
 
 @pytest.mark.parametrize(("share", "name"), [(KNOWN, "humans_parts"), (KNOWN - 0.01, "acd")])
