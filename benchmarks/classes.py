@@ -9,7 +9,6 @@ float32 that PyTorch's own loss keeps would take alone.
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 
 import torch
@@ -46,12 +45,8 @@ def two_steps(variant: str, n: int) -> None:
         step.take(variant)
 
 
-def named(variant: str, n: int) -> str:
-    return f"{variant}, {n}"
-
-
 def main() -> None:
-    every = {named(variant, n): (variant, n) for n in SIZES for variant in OURS}
+    every = {f"{variant}, {n}": (variant, n) for n in SIZES for variant in OURS}
     chosen = options("classes", __doc__, list(every), repeats=1)
     if chosen.peak_of:
         variant, n = every[chosen.peak_of]
@@ -63,7 +58,7 @@ def main() -> None:
         for name, (variant, n) in every.items()
     ]
     for row in rows:
-        print(f"{row.variant:<24}{row.classes:>8}{row.megabytes:>10.0f} MB, logits {row.logits:.0f}", file=sys.stderr)
+        print(f"{row.variant:<24}{row.classes:>8}{row.megabytes:>10.0f} MB, logits {row.logits:.0f}")
     write("classes", chosen, {}, rows)
 
 

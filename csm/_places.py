@@ -14,6 +14,17 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 
 
+def shown(name: object) -> str:
+    """Return a name as a message shows it, or what came instead of one.
+
+    Examples
+    --------
+    >>> shown("hks"), shown([1, 2])
+    ("'hks'", 'a list')
+    """
+    return repr(name) if isinstance(name, str) else f"a {type(name).__name__}"
+
+
 def load(place: str) -> Any:
     """Import an object by its place, such as "csm.descriptors.acd:ACD.paper": a module, a colon, a name in it.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
-from csm._places import Loaded, load
+from csm._places import Loaded, load, shown
 from csm.errors import ConfigError
 from csm.matching.base import Matcher
 from csm.matching.refinement.base import Refined, Refiner
@@ -47,8 +47,7 @@ def matcher(name: str | Matcher) -> Matcher:
         rule, improver = matcher(first), refiner(second)
         return rule if improver is None else Refined(rule, improver)
     if not isinstance(name, str) or name not in MATCHERS:
-        shown = repr(name) if isinstance(name, str) else f"a {type(name).__name__}"
-        raise ConfigError(f"matching={shown}; wanted {' or '.join(MATCHERS)}")
+        raise ConfigError(f"matching={shown(name)}; wanted {' or '.join(MATCHERS)}")
     return MATCHERS[name]()
 
 

@@ -56,12 +56,11 @@ def suited(meshes: Sequence[Mesh], store: Store, device: str = "cpu") -> tuple[M
     described = describe_all(network, meshes, store, device)
     shares = returning_both_ways(*described)
     share, whose = (min(shares), "") if part is None else (shares[part], f" of {meshes[part].name or 'the open mesh'}")
-    why = f"model=auto: {100 * share:.0f} % of the nearest neighbours{whose} in the network {network.name} return"
+    found = f"{100 * share:.0f} % of the nearest neighbours{whose} in the network {network.name} return to their place"
     if share >= KNOWN:
-        return (
-            network,
-            f"{why} to their place, as on human bodies, so it was taken; model=null is the descriptor acd",
-            described,
-        )
-    why += f" to their place, fewer than on human bodies, so the descriptor acd was taken; model={network.name} insists"
-    return as_method("acd"), why if part is not None else f"{why}, model={KNOWS_PARTS} where a part is missing", []
+        why = "as on human bodies, so it was taken; model=null is the descriptor acd"
+        return network, f"model=auto: {found}, {why}", described
+    why = f"fewer than on human bodies, so the descriptor acd was taken; model={network.name} insists"
+    if part is None:
+        why += f", model={KNOWS_PARTS} where a part is missing"
+    return as_method("acd"), f"model=auto: {found}, {why}", []

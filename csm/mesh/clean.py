@@ -215,22 +215,24 @@ class _Work:
     def note_unsound_faces(self, count: int) -> None:
         self._did("faces", count, "face", "left out: corners that coincide, or a face twice")
 
-    def require_faces(self, mesh: Mesh | PolygonMesh) -> None:
-        if not len(self.faces) or flat_faces(Mesh(self.vertices, self.faces)).all():
+    def flat(self, mesh: Mesh | PolygonMesh) -> BoolArray:
+        """Which present faces have no area; MeshError if none has one."""
+        flat = flat_faces(Mesh(self.vertices, self.faces)) if len(self.faces) else np.ones(0, dtype=bool)
+        if flat.all():
             n = len(mesh.faces) if isinstance(mesh, Mesh) else len(mesh.sizes)
             every = "its only face vanishes" if n == 1 else f"all of its {n} faces vanish"
             raise MeshError(f"{mesh.label}: {every}: corners coincide or lie on a line; no surface is left")
+        return flat
 
     def collapse(self, mesh: Mesh | PolygonMesh) -> None:
-        total = 0
-        self.require_faces(mesh)
+        total, flat = 0, self.flat(mesh)
         for _ in range(5):
-            count = self._join(collapsed(self.vertices, self.faces, flat_faces(Mesh(self.vertices, self.faces))))
+            count = self._join(collapsed(self.vertices, self.faces, flat))
             if not count:
                 break
             total += count
             self._keep_faces(sound_faces(self.faces))
-            self.require_faces(mesh)
+            flat = self.flat(mesh)
         self._did("collapse", total, "vertex", "with faces of zero area only joined with their nearest neighbour")
 
     def split(self) -> None:

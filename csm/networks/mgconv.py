@@ -63,9 +63,10 @@ class WaveletOperators:
         whole: bool | None = None,
     ) -> None:
         self._evecs, self._responses = stencil["evecs"].to(dtype), stencil["responses"].to(dtype)
+        whole = self._evecs.is_cuda if whole is None else whole
         self._used: list[int]  # eigenfunctions of each wavelet; the responses to the rest are zeros
         self._extents: list[list[int]]
-        if self._evecs.is_cuda if whole is None else whole:
+        if whole:
             (n, k), s = self._evecs.shape, self.n_wavelets
             every = torch.arange(n, device=self._evecs.device)
             self._rows = torch.split(every, WHOLE_ROWS)

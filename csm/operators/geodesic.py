@@ -13,6 +13,7 @@ import potpourri3d
 from pygeodesic.geodesic import PyGeodesicAlgorithmExact
 from scipy.sparse.csgraph import dijkstra
 
+from csm._places import shown
 from csm._types import BoolArray, FloatArray, IntArray
 from csm.errors import ConfigError, MeshError
 from csm.mesh.check import check
@@ -79,8 +80,7 @@ def geodesics(mesh: MeshLike, method: Method = "exact") -> Geodesics:
     """
     kinds: dict[str, type[_OnMesh]] = {"exact": _Exact, "heat": _Heat, "edge": _Edge}
     if not isinstance(method, str) or method not in kinds:
-        shown = repr(method) if isinstance(method, str) else f"a {type(method).__name__}"
-        raise ConfigError(f"geodesic method {shown} is unknown: choose one of {', '.join(get_args(Method))}")
+        raise ConfigError(f"geodesic method {shown(method)} is unknown: choose one of {', '.join(get_args(Method))}")
     return kinds[method](as_mesh(mesh))
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from csm._types import FloatArray, IntArray
 from csm.errors import ConfigError
@@ -88,6 +87,8 @@ def turned_alike(mesh: Mesh, to_reference: IntArray, reference: Mesh, up: Axis |
         Shape (3, 3): the reference's `body_axes`, turned by the rotation that brings the vertices nearest to their
         partners, both at one size around their middles.
     """
+    from scipy.spatial.transform import Rotation
+
     known = np.flatnonzero(to_reference >= 0)
     here, there = mesh.vertices[known], reference.vertices[to_reference[known]]
     here, there = (points - points.mean(axis=0) for points in (here, there)) if known.size else (here, there)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
-from csm._places import Loaded, load
+from csm._places import Loaded, load, shown
 from csm.errors import ConfigError
 from csm.matching.base import Matcher
 from csm.matching.refinement.base import Refined, Refiner
@@ -49,9 +49,8 @@ def refiner(name: str | Refiner | None) -> Refiner | None:
     if name == NONE:
         return None
     if not isinstance(name, str) or name not in REFINERS:
-        shown = repr(name) if isinstance(name, str) else f"a {type(name).__name__}"
         names = f"{NONE}, {', '.join(list(REFINERS)[:-1])} or {list(REFINERS)[-1]}"
-        raise ConfigError(f"refine={shown}; wanted {names}; a match of two meshes also takes auto")
+        raise ConfigError(f"refine={shown(name)}; wanted {names}; a match of two meshes also takes auto")
     return REFINERS[name]()
 
 
