@@ -15,12 +15,14 @@ from scipy.spatial import cKDTree
 
 from csm._counts import counted
 from csm._types import Arrays, FloatArray, IntArray
+from csm.errors import NumericalError
 from csm.mesh.check import require_usable
 from csm.mesh.debris import Body, body_of, component_areas
 from csm.mesh.debris import unit_area as with_unit_area
 from csm.mesh.inputs import MeshLike, as_mesh
 from csm.mesh.shape import Mesh
 from csm.operators._factors import Factors
+from csm.operators.coarsening import Coarse, coarsen
 from csm.operators.frames import FrameKind, face_frames
 from csm.operators.laplacian import (
     AnisotropicStiffness,
@@ -29,9 +31,13 @@ from csm.operators.laplacian import (
     stiffness,
     vertex_areas,
 )
+from csm.operators.multilevel import most_pairs, multilevel_eigenpairs
 from csm.operators.spectrum import Spectrum, eigenpairs
 
 _log = logging.getLogger(__name__)
+
+DIRECT_UP_TO = 200_000
+"""Vertices of the largest mesh whose matrices are factored; for larger ones the multilevel way is quicker."""
 
 
 class Memo(Protocol):
@@ -187,7 +193,7 @@ class Operators:
         return self._spectrum("albo", params, solve)
 
     def _solve(self, matrix: sparse.csr_array, k: int, density: float = 1.0) -> Spectrum:
-        spectrum = eigenpairs(
+        spectrum = self._multilevel(matrix, k, density) or eigenpairs(
             matrix, self.mass, k, name=self.mesh.label, density=density, factors=self._factors(matrix)
         )
         flat = self._flat
@@ -201,6 +207,21 @@ class Operators:
             _log.warning("%s: %s", self.mesh.label, note)
             self._said_flat = True
         return replace(spectrum, notes=(*spectrum.notes, note))
+
+    def _multilevel(self, matrix: sparse.csr_array, k: int, density: float) -> Spectrum | None:
+        """Return the eigenpairs of a big mesh; None if it is not big, or if this way does not suit it."""
+        if self.mesh.n_vertices <= DIRECT_UP_TO or k > most_pairs(self.coarse):
+            return None
+        try:
+            return multilevel_eigenpairs(matrix, self.mass, k, self.coarse, name=self.mesh.label, density=density)
+        except NumericalError as error:
+            _log.warning("%s; they are computed from a factorisation, which takes time and memory", error)
+            return None
+
+    @cached_property
+    def coarse(self) -> Coarse:
+        """A coarse mesh, from which the eigenpairs of one of more than `DIRECT_UP_TO` vertices are refined."""
+        return coarsen(self.mesh)
 
     @cached_property
     def _flat(self) -> IntArray:

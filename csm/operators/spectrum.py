@@ -120,13 +120,11 @@ def eigenpairs(
     """
     _require_solvable(stiffness, mass, k, name)
     scale = 1.0 / np.sqrt(mass)
-    matrix, unit = _symmetrised(stiffness, scale), 1.0 / mass.sum()
+    matrix, unit = symmetrised(stiffness, scale), 1.0 / mass.sum()
     problem = Problem(matrix, k, unit, 4 * np.pi * k * unit / density, factors or Factors(matrix))
     with _blas().limit(limits=1):
         found, notes = _solved(problem, name)
-        evals = np.where(found.evals < _ZERO * problem.unit, 0.0, found.evals)
-        evecs = _with_fixed_signs(scale[:, None] * found.evecs)
-        return Spectrum(evals, evecs, mass, found.residual, notes)
+    return finished(found, mass, scale, notes)
 
 
 def _solved(problem: Problem, name: str) -> tuple[Pairs, tuple[str, ...]]:
@@ -169,7 +167,14 @@ def _require_solvable(stiffness: sparse.csr_array, mass: FloatArray, k: int, nam
         )
 
 
-def _symmetrised(stiffness: sparse.csr_array, scale: FloatArray) -> sparse.csc_array:
+def finished(found: Pairs, mass: FloatArray, scale: FloatArray, notes: tuple[str, ...] = ()) -> Spectrum:
+    """Return the spectrum of a mesh from the pairs of its symmetric matrix (`symmetrised`), whose arrays it takes."""
+    evals = np.where(found.evals < _ZERO / mass.sum(), 0.0, found.evals)
+    found.evecs[:] *= scale[:, None]
+    return Spectrum(evals, _with_fixed_signs(found.evecs), mass, found.residual, notes)
+
+
+def symmetrised(stiffness: sparse.csr_array, scale: FloatArray) -> sparse.csc_array:
     """Return M^-1/2 S M^-1/2, whose eigenvalues are those of the generalised problem; rows and columns are the same."""
     stiffness.sort_indices()
     data = stiffness.data * np.repeat(scale, np.diff(stiffness.indptr)) * scale[stiffness.indices]
@@ -177,7 +182,8 @@ def _symmetrised(stiffness: sparse.csr_array, scale: FloatArray) -> sparse.csc_a
 
 
 def _with_fixed_signs(evecs: FloatArray) -> FloatArray:
-    magnitude = np.abs(evecs)
-    first_greatest = np.argmax(magnitude >= magnitude.max(axis=0) * (1 - 1e-6), axis=0)
-    signs: FloatArray = np.sign(evecs[first_greatest, np.arange(evecs.shape[1])])
-    return evecs * signs
+    for column in evecs.T:  # one by one: a copy of all may be too large
+        magnitude = np.abs(column)
+        if column[np.argmax(magnitude >= magnitude.max() * (1 - 1e-6))] < 0:
+            column *= -1
+    return evecs
