@@ -15,7 +15,7 @@ from omegaconf import DictConfig
 from csm.commands.app import command
 from csm.commands.outputs import require_file_place
 from csm.errors import ConfigError, DataError
-from csm.experiments.sweeps import is_report, write_sweep_report
+from csm.experiments.sweep_page import is_report, write_sweep_report
 
 _PAGE = "sweep.html"
 

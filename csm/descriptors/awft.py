@@ -94,7 +94,7 @@ class AWFT(Descriptor):
         super().__post_init__()
         for field in ("alphas", "degrees", "taus", "functions"):  # lists, as json and configuration files have them
             object.__setattr__(self, field, tuple(getattr(self, field)))
-        require_known(self.functions, self.normalise)
+        require_known(self.functions)
         if self.k < 2 or self.index_sweeps < 0 or not self.degrees:
             raise ConfigError(f"{self}: wanted k >= 2, index_sweeps >= 0 and at least one angle")
         if not (self.alphas and self.taus and min(self.alphas) > 0 and min(self.taus) > 0):

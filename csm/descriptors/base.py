@@ -9,8 +9,9 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
+from functools import cache
 from numbers import Integral, Real
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -64,17 +65,25 @@ _WANTED = {
     "float": "a finite number",
     "bool": "true or false",
     "tuple[float, ...]": "a list of finite numbers",
+    "tuple[str, ...]": "a list of names",
 }
 """Annotations of parameters that are checked, and what is wanted of them."""
 
 
 def _is_kind(value: Any, kind: str) -> bool:
-    if kind == "tuple[float, ...]":
-        several = isinstance(value, Sequence) and not isinstance(value, str)
-        return several and all(_is_kind(each, "float") for each in value)
+    if kind.startswith("tuple"):
+        several, each = isinstance(value, Sequence) and not isinstance(value, str), kind[6:].partition(",")[0]
+        return several and all(isinstance(one, str) if each == "str" else _is_kind(one, each) for one in value)
     if kind == "bool" or isinstance(value, bool):
         return kind == "bool" and isinstance(value, bool)
     return isinstance(value, Integral) if kind == "int" else isinstance(value, Real) and math.isfinite(value)
+
+
+@cache
+def _choices(family: type) -> dict[str, tuple[Any, ...]]:
+    """Return the words among which parameters of a family choose, by their annotations."""
+    hints = get_type_hints(family).items()
+    return {name: get_args(hint) for name, hint in hints if get_origin(hint) is Literal}
 
 
 @dataclass(frozen=True)
@@ -104,9 +113,9 @@ class Descriptor(ABC):
     by_component: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        """Raise a ConfigError if a parameter is not of the kind of its annotation; families check more.
+        """Raise a ConfigError if a parameter is not of the kind, or none of the words, of its annotation.
 
-        Numbers of other libraries become Python's, which can be written to files.
+        Families check more.  Numbers of other libraries become Python's, which can be written to files.
         """
         for field in fields(self):
             kind, _, rest = str(field.type).partition(" | ")
@@ -117,6 +126,9 @@ class Descriptor(ABC):
                 raise ConfigError(f"{self.name}: {field.name}={value!r}; wanted {_WANTED[kind]}")
             if kind in ("int", "float") and not isinstance(value, int | float):
                 object.__setattr__(self, field.name, int(value) if kind == "int" else float(value))
+        for name, words in _choices(type(self)).items():
+            if getattr(self, name) not in words:
+                raise ConfigError(f"{self.name}: {name}={getattr(self, name)!r}; wanted one of {', '.join(words)}")
 
     @property
     def eigenpairs(self) -> int:

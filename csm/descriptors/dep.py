@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
-from typing import ClassVar, Literal, NamedTuple, TypeAlias, get_args
+from typing import ClassVar, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -82,8 +82,6 @@ class DEP(Descriptor):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.distance not in get_args(EvolutionDistance):
-            raise ConfigError(f"{self}: distance must be one of {', '.join(get_args(EvolutionDistance))}")
         if self.n_scales < 1 or self.k < 2 or not 0 < self.smallest <= self.largest <= 1:
             raise ConfigError(f"{self}: wanted n_scales >= 1, k >= 2 and 0 < smallest <= largest <= 1")
         if not (0 < self.c < 1 and 0 < self.tolerance < 1):

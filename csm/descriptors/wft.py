@@ -83,7 +83,7 @@ class WFT(Descriptor):
         super().__post_init__()
         for field in ("taus", "functions"):  # lists, as json and configuration files have them
             object.__setattr__(self, field, tuple(getattr(self, field)))
-        require_known(self.functions, self.normalise)
+        require_known(self.functions)
         if self.k < 2 or not self.taus or not min(self.taus) > 0 or self.index_sweeps < 0:
             raise ConfigError(f"{self}: wanted k >= 2, positive taus and index_sweeps >= 0")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import Literal, TypeAlias, get_args
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -29,8 +29,8 @@ SINGLE = ("constant", "fiedler", "shape_index")
 _FLAT = 1e-9  # curvature tensors below this (radians, edge lengths relative to the mean) are rounding
 
 
-def require_known(functions: Sequence[str], normalise: str) -> None:
-    """Raise ConfigError unless these are functions of `surface_functions` and a norm of `unit_columns`."""
+def require_known(functions: Sequence[str]) -> None:
+    """Raise ConfigError unless these are functions of `surface_functions`."""
     for name in functions:
         family, number = _parts(name)
         if name not in SINGLE and not 1 <= number <= BANKS.get(family, 0):
@@ -38,8 +38,6 @@ def require_known(functions: Sequence[str], normalise: str) -> None:
             raise ConfigError(f"there is no function {name!r} on a surface; there are {', '.join(SINGLE)}, {banks}")
     if not functions or len(set(functions)) < len(functions):
         raise ConfigError(f"functions are {functions}; wanted one or more, each once")
-    if normalise not in get_args(ColumnNorm):
-        raise ConfigError(f"normalise is {normalise!r}, wanted one of {', '.join(get_args(ColumnNorm))}")
 
 
 def surface_functions(

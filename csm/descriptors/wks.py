@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal, NamedTuple, TypeAlias, get_args
+from typing import ClassVar, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from scipy.special import softmax
@@ -54,8 +54,6 @@ class WKS(Descriptor):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.variant not in get_args(WaveVariant):
-            raise ConfigError(f"{self}: variant must be one of {', '.join(get_args(WaveVariant))}")
         least = 29 if self.variant == "functional_map" else 2
         if self.k < 2 or self.n_energies < least:
             raise ConfigError(f"{self}: wanted k of at least 2 and n_energies of at least {least}")

@@ -86,18 +86,13 @@ def test_columns_of_unit_length_over_vertices_and_over_area():
 @pytest.mark.parametrize("name", ["geovec", "geovec0", "geovec151", "hks101", "constant1", "colour", "", "a b"])
 def test_unknown_functions_are_refused(name):
     with pytest.raises(ConfigError, match="fiedler"):
-        require_known([name], "area")
+        require_known([name])
 
 
 @pytest.mark.parametrize("functions", [(), ("constant", "constant")])
 def test_no_function_or_one_twice_is_refused(functions):
     with pytest.raises(ConfigError, match="each once"):
-        require_known(functions, "area")
-
-
-def test_an_unknown_norm_is_refused():
-    with pytest.raises(ConfigError, match="vertices, area"):
-        require_known(["constant"], "columns")
+        require_known(functions)
 
 
 def test_nothing_but_zero_eigenvalues_is_an_error():
