@@ -55,19 +55,26 @@ def coarsen(mesh: Mesh, at_most: int = AT_MOST) -> Coarse:
     >>> from csm import load_humans
     >>> coarse = coarsen(load_humans()[0])
     >>> coarse.interpolation.shape
-    (6899, 678)
+    (6899, 663)
     """
     graph = edge_graph(mesh.vertices, mesh.faces)
-    seeds, reach = _seeds(graph, 2), 2
+    seeds, reach = spread_out(graph, 2), 2
     while len(seeds) > at_most and reach < 16:
         reach += 1
-        seeds = _seeds(graph, reach)
+        seeds = spread_out(graph, reach)
     cell = _cells(graph, seeds)
     return Coarse(seeds, _interpolation(mesh, seeds, cell))
 
 
-def _seeds(graph: sparse.csr_array, reach: int) -> IntArray:
-    """Return a maximal set of vertices no two of which are within `reach` edges, by rounds of drawn priorities."""
+def spread_out(graph: sparse.csr_array, reach: int) -> IntArray:
+    """Return a maximal set of vertices of a graph no two of which are within `reach` edges of each other.
+
+    Examples
+    --------
+    >>> path = sparse.csr_array(sparse.diags_array([np.ones(8), np.ones(8)], offsets=[-1, 1]))
+    >>> np.diff(spread_out(path, 2)) > 2
+    array([ True,  True])
+    """
     n = graph.shape[0]
     ring = sparse.csr_array(graph + sparse.eye_array(n))
     priority = np.random.default_rng(0).permutation(n) + 1

@@ -7,6 +7,8 @@ and smoothing stay on the surface.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
@@ -15,11 +17,13 @@ from csm._types import ComplexArray, FloatArray
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.operators._edges import InteriorEdges, dot, interior_edges, longest_edge_basis
+from csm.operators._field import FieldDiffusion
 
 CURVATURE_LENGTH = 0.01
 """Length over which curvature is first averaged, in units of sqrt(area): about one edge of a mesh of 7,000 vertices."""
 
 _FLAT = 1e-9  # curvature below this, times sqrt(area), is rounding
+_FACTORED = 50_000  # faces up to which a factorisation takes no longer
 _LEAST_AREA = 1e-6  # of the mean face: slivers take their neighbours' line
 
 
@@ -65,11 +69,12 @@ def smooth_line_field(mesh: Mesh, smoothing: float) -> ComplexArray:
     np.add.at(measure, edges.right, 0.5 * edges.angle * edges.length * right)
     laplacian = _connection_laplacian(edges, left * right.conj(), area)
 
-    density = _diffuse(measure, CURVATURE_LENGTH**2 * total, area, laplacian)
+    diffuse = _diffusion(area, laplacian)
+    density = diffuse(measure, CURVATURE_LENGTH**2 * total)
     size = np.abs(density)
     curved = size * np.sqrt(total) > _FLAT
     lines = -density / np.where(curved, size, np.inf)  # the measure lies along creases, across the greatest curvature
-    return _diffuse(area * lines, smoothing**2 * total, area, laplacian)
+    return diffuse(area * lines, smoothing**2 * total)
 
 
 def _edge_lines(mesh: Mesh, edges: InteriorEdges) -> tuple[ComplexArray, ComplexArray]:
@@ -91,7 +96,14 @@ def _connection_laplacian(edges: InteriorEdges, transport: ComplexArray, area: F
     return sparse.csc_array((values, (rows, columns)), shape=(n, n))
 
 
-def _diffuse(measure: ComplexArray, time: float, area: FloatArray, laplacian: sparse.csc_array) -> ComplexArray:
-    """Return the density z with (A + time K) z = measure, shape (M,)."""
-    z: ComplexArray = splu(sparse.csc_array(sparse.diags_array(area) + time * laplacian)).solve(measure)
-    return z
+def _diffusion(area: FloatArray, laplacian: sparse.csc_array) -> Callable[[ComplexArray, float], ComplexArray]:
+    """Return a function of a measure, shape (M,), and a time: the density z with (A + time K) z = measure."""
+    iterative = FieldDiffusion(laplacian, area) if len(area) > _FACTORED else None
+
+    def diffuse(measure: ComplexArray, time: float) -> ComplexArray:
+        z = iterative.solve(measure, time) if iterative else None
+        if z is None:
+            z = splu(sparse.csc_array(sparse.diags_array(area) + time * laplacian)).solve(measure)
+        return z
+
+    return diffuse

@@ -17,10 +17,11 @@ from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from csm._parallel import thread_map
-from csm._types import FloatArray
+from csm._types import Float32Array, FloatArray
 from csm.errors import ConfigError, NumericalError
 from csm.operators._eigensolver import Pairs
 from csm.operators._factors import Factors
+from csm.operators._grids import Smoother
 from csm.operators.coarsening import Coarse
 from csm.operators.spectrum import Spectrum, eigenpairs, finished, symmetrised
 
@@ -151,69 +152,66 @@ class _TwoGrids:
     ) -> None:
         self._matrix, self._up = matrix.astype(np.float32), up.astype(np.float32)
         self._down = sparse.csr_array(self._up.T)
+        self._smooth = Smoother(self._matrix, _SMOOTHING)
         self._factors, self._lock = factors, Lock()
         self._factors.factor(reduced, -unit)
-        diagonal = self._matrix.diagonal()
-        self._weights = (1 / (self._greatest(diagonal) * diagonal))[:, None]
 
-    def _greatest(self, diagonal: FloatArray) -> float:
-        """Return a little more than the greatest eigenvalue of the matrix over its diagonal."""
-        vector, size = np.random.default_rng(0).standard_normal(len(diagonal), np.float32), 1.0
-        for _ in range(20):
-            vector = (self._matrix @ (vector / size)) / diagonal
-            size = float(np.linalg.norm(vector))
-        return 1.1 * size
-
-    def inverse(self, columns: FloatArray) -> FloatArray:
+    def inverse(self, columns: Float32Array) -> Float32Array:
         """Return an approximate solution for right-hand sides of shape (N, B)."""
-        found = self._smoothed(columns)
+        found = self._smooth(columns)
         below = self._down @ (columns - self._matrix @ found)
         with self._lock:
             solved = self._factors.solve(below.astype(np.float64))
         found += self._up @ solved.astype(np.float32)
-        found += self._smoothed(columns - self._matrix @ found)
+        found += self._smooth(columns - self._matrix @ found)
         return found
 
-    def _smoothed(self, columns: FloatArray) -> FloatArray:
-        """Return what Chebyshev polynomials of the fourth kind in the matrix over its diagonal make of columns."""
-        step = np.multiply(columns, self._weights * np.float32(4 / 3))
-        found, left, scaled = step.copy(), columns.copy(), np.empty_like(columns)
-        for i in range(1, _SMOOTHING):
-            left -= self._matrix @ step
-            step *= np.float32((2 * i - 1) / (2 * i + 3))
-            step += np.multiply(left, self._weights * np.float32((8 * i + 4) / (2 * i + 3)), out=scaled)
-            found += step
-        return found
+
+class _Strip(NamedTuple):
+    """Some rows of a matrix, without the columns before the first and after the last that they have entries in."""
+
+    rows: slice
+    reach: slice
+    matrix: sparse.csr_array
+
+    @classmethod
+    def of(cls, matrix: sparse.csr_array, rows: slice) -> _Strip:
+        part = matrix[rows]
+        reach = slice(int(part.indices.min()), int(part.indices.max()) + 1)
+        return cls(rows, reach, part[:, reach])
 
 
 class _Space:
     """The columns among which the eigenvectors are sought, and their products with each other and by the matrix.
 
     There are three blocks of B columns: the approximations, their corrections, and the directions, which are what the
-    last step added to the approximations before.
+    last step added to the approximations before.  Corrections need single precision only.
     """
 
     def __init__(self, matrix: sparse.csr_array, start: FloatArray) -> None:
         n, self._size = start.shape
         self._matrix = matrix
-        self._rows = [slice(at, min(at + _ROWS, n)) for at in range(0, n, _ROWS)]
-        self._matrices = [matrix[rows] for rows in self._rows]
-        self._blocks = [start, np.zeros_like(start), np.zeros_like(start)]
+        self._strips = [_Strip.of(matrix, slice(at, min(at + _ROWS, n))) for at in range(0, n, _ROWS)]
+        self._blocks: list[FloatArray | Float32Array] = [start, np.zeros(start.shape, np.float32), np.zeros_like(start)]
         self._gram, self._energy = (np.zeros((3 * self._size, 3 * self._size)) for _ in range(2))
         self._take_best(0)
 
     @property
     def found(self) -> FloatArray:
         """The approximations, shape (N, B), of which `evals` are the eigenvalues."""
-        return self._blocks[0]
+        return np.asarray(self._blocks[0], np.float64)
 
-    def correct(self, correction: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    def correct(self, correction: Callable[[Float32Array], Float32Array]) -> FloatArray:
         """Look for corrections of all approximations; return the squared errors of these, shape (B,)."""
 
         def corrected(begin: int) -> FloatArray:
             some = slice(begin, begin + _COLUMNS)
-            columns = np.ascontiguousarray(self.found[:, some])
-            defect = (columns * self.evals[some] - self._matrix @ columns).astype(np.float32)
+            columns = self.found[:, some].copy()
+            image = self._matrix @ columns
+            columns *= self.evals[some]
+            columns -= image
+            del image  # a hundred megabytes at a million vertices
+            defect = columns.astype(np.float32)
             self._blocks[1][:, some] = found = correction(defect)
             squared: FloatArray = np.einsum("nb,nb->b", defect, found, dtype=np.float64)
             return squared
@@ -241,24 +239,24 @@ class _Space:
         weights = np.hstack([best, np.zeros_like(best), added])
         self._gram, self._energy = (weights.T @ products @ weights for products in (self._gram, self._energy))
 
-        def mixed(rows: slice) -> None:
-            near, far, last = (block[rows] for block in self._blocks)
-            last[:] = far @ added[b : 2 * b] + last @ added[2 * b :]
+        def mixed(strip: _Strip) -> None:
+            near, far, last = (block[strip.rows] for block in self._blocks)
+            last[:] = far.astype(np.float64, copy=False) @ added[b : 2 * b] + last @ added[2 * b :]
             near[:] = near @ best[:b] + last
 
-        thread_map(mixed, self._rows)
+        thread_map(mixed, self._strips)
 
     def _multiply(self, changed: int) -> None:
         """Find the products of one block with all."""
         columns, b = self._blocks[changed], self._size
 
-        def products(at: int) -> tuple[FloatArray, FloatArray]:
-            rows = self._rows[at]
-            here, image = columns[rows], self._matrices[at] @ columns
-            blocks = [block[rows] for block in self._blocks]
+        def products(strip: _Strip) -> tuple[FloatArray, FloatArray]:
+            here = columns[strip.rows].astype(np.float64, copy=False)
+            image = strip.matrix @ columns[strip.reach].astype(np.float64, copy=False)
+            blocks = [block[strip.rows].astype(np.float64, copy=False) for block in self._blocks]
             return np.vstack([block.T @ here for block in blocks]), np.vstack([block.T @ image for block in blocks])
 
-        found = thread_map(products, list(range(len(self._rows))))
+        found = thread_map(products, self._strips)
         new = slice(changed * b, (changed + 1) * b)
         for whole, parts in zip((self._gram, self._energy), zip(*found, strict=True), strict=True):
             part = np.sum(parts, axis=0)

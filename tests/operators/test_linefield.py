@@ -7,6 +7,7 @@ import pytest
 
 from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
+from csm.operators import _field, linefield
 from csm.operators._edges import interior_edges, longest_edge_basis
 from csm.operators.frames import face_frames
 from csm.operators.linefield import CURVATURE_LENGTH, smooth_line_field
@@ -117,3 +118,29 @@ def test_both_steps_minimise_their_energy():
 def test_negative_length_is_refused():
     with pytest.raises(ConfigError, match="wanted"):
         smooth_line_field(sphere(1), -0.1)
+
+
+@pytest.fixture
+def all_are_big(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(linefield, "_FACTORED", 0)
+
+
+@pytest.mark.usefixtures("all_are_big")
+@pytest.mark.parametrize("smoothing", [0.0, 0.02, 0.08])
+@pytest.mark.parametrize(
+    "mesh",
+    [blob(4), torus(), cylinder(), plane(), Mesh(np.eye(3), np.array([[0, 1, 2]]), "face")],
+    ids=lambda m: m.name,
+)
+def test_without_a_factorisation_it_is_the_same(monkeypatch: pytest.MonkeyPatch, mesh: Mesh, smoothing: float):
+    found = smooth_line_field(mesh, smoothing)
+    monkeypatch.setattr(linefield, "_FACTORED", 10**9)
+    np.testing.assert_allclose(found, smooth_line_field(mesh, smoothing), atol=1e-8)
+
+
+@pytest.mark.usefixtures("all_are_big")
+def test_it_is_factored_after_all_where_the_iteration_does_not_end(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(_field, "_STEPS", 1)
+    found = smooth_line_field(blob(4), 0.08)
+    monkeypatch.setattr(linefield, "_FACTORED", 10**9)
+    np.testing.assert_array_equal(found, smooth_line_field(blob(4), 0.08))
