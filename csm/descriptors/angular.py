@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from multiprocessing import parent_process
+
 import numpy as np
 
 from csm._parallel import thread_map
+from csm._progress import progress_bar
 from csm._types import FloatArray
 from csm.descriptors.base import Descriptor
 from csm.errors import ConfigError
 from csm.operators.frames import FrameKind
 from csm.operators.operators import Operators
 from csm.operators.spectrum import Spectrum
+
+_SLOW = 100_000  # vertices; the angles of larger meshes take half a minute and more
 
 
 class ByAngle(Descriptor):
@@ -33,11 +38,21 @@ class ByAngle(Descriptor):
             raise ConfigError(f"{self}: at alpha=0 all {self.angles} blocks would be equal; set angles=1")
 
     def _spectra(self, operators: Operators, k: int | None = None) -> list[Spectrum]:
-        """Return the `k` smallest eigenpairs for each angle; several threads compute them."""
+        """Return the `k` smallest eigenpairs for each angle, by several threads, with a bar for big meshes."""
         _ = operators.mass  # what all angles share is made before the threads begin
         if self.alpha > 0:
             operators.anisotropic(frame=self.frame, sweeps=self.sweeps, smoothing=self.smoothing)
-        return thread_map(lambda theta: self._spectrum(operators, theta, k), self.thetas.tolist())
+        mesh, alone = operators.mesh, parent_process() is None  # a process of a parallel map has a bar for all shapes
+        with progress_bar(
+            total=self.angles, desc=mesh.label, unit="angle", disable=not (alone and mesh.n_vertices > _SLOW)
+        ) as bar:
+
+            def spectrum(theta: float) -> Spectrum:
+                found = self._spectrum(operators, theta, k)
+                bar.update()
+                return found
+
+            return thread_map(spectrum, self.thetas.tolist())
 
     def _spectrum(self, operators: Operators, theta: float, k: int | None = None) -> Spectrum:
         k = self.k if k is None else k

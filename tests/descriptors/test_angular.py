@@ -3,7 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from csm.descriptors import ACD, ASMWD
+from csm import _progress
+from csm.descriptors import ACD, ASMWD, angular
 from csm.errors import ConfigError
 from csm.operators import Operators
 from tests.shapes import blob
@@ -24,3 +25,13 @@ def test_without_anisotropy_one_angle_is_enough_and_more_are_refused(family):
     assert family(alpha=0, angles=1, k=5)._spectrum(operators, 0.0) is operators.lbo(5)
     with pytest.raises(ConfigError, match="set angles=1"):
         family(alpha=0, angles=2)
+
+
+def test_the_angles_of_a_big_mesh_have_a_bar(monkeypatch, capsys):
+    monkeypatch.setattr(_progress, "SECONDS", 0.0)
+    family = ACD(angles=3, k=5, cuts=1)
+    family(blob(2))
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(angular, "_SLOW", 100)
+    family(blob(2))
+    assert "3/3" in capsys.readouterr().err
