@@ -32,7 +32,7 @@ _STEPS = 40  # of refinement; meshes of good faces need 3 to 6
 _SMOOTHING = 4  # degree of the smoother before and after the coarse correction
 _COLUMNS = 14  # that are corrected at once
 _ROWS = 20_000  # that are mixed at once
-_SAME = 1e-12  # columns that others span but for this square of their length are left out
+_SAME = 1e-7  # columns that others span but for this square of their length are left out: rounding would grow
 
 
 def multilevel_eigenpairs(
