@@ -23,7 +23,7 @@ from csm.operators._eigensolver import Pairs
 from csm.operators._factors import Factors
 from csm.operators._grids import Smoother
 from csm.operators.coarsening import Coarse
-from csm.operators.spectrum import Spectrum, eigenpairs, finished, symmetrised
+from csm.operators.spectrum import Spectrum, eigenpairs, finished, require_solvable, symmetrised
 
 TOLERANCE = 1e-3
 """Greatest estimated error of an accepted eigenvector, in the norm of the energy, over sqrt(lambda_K)."""
@@ -68,7 +68,7 @@ def multilevel_eigenpairs(
     ConfigError
         If more than `most_pairs` are asked for.
     MeshError
-        As for `eigenpairs`.
+        If a vertex has no area or the matrix is not finite.
     NumericalError
         If the refinement does not converge, as on meshes with very thin faces.
 
@@ -84,6 +84,7 @@ def multilevel_eigenpairs(
     >>> bool(error < 1e-6)
     True
     """
+    require_solvable(stiffness, mass, k, name)
     if k > most_pairs(coarse):
         raise ConfigError(
             f"{name}: asked for {k} eigenpairs from a coarse mesh of {len(coarse.seeds)} vertices, which is enough for "

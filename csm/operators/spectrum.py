@@ -118,7 +118,7 @@ def eigenpairs(
     NumericalError
         If no attempt passed the checks.
     """
-    _require_solvable(stiffness, mass, k, name)
+    require_solvable(stiffness, mass, k, name)
     scale = 1.0 / np.sqrt(mass)
     matrix, unit = symmetrised(stiffness, scale), 1.0 / mass.sum()
     problem = Problem(matrix, k, unit, 4 * np.pi * k * unit / density, factors or Factors(matrix))
@@ -148,7 +148,8 @@ def _blas() -> ThreadpoolController:
     return ThreadpoolController()  # listing the loaded libraries takes milliseconds, so once
 
 
-def _require_solvable(stiffness: sparse.csr_array, mass: FloatArray, k: int, name: str) -> None:
+def require_solvable(stiffness: sparse.csr_array, mass: FloatArray, k: int, name: str) -> None:
+    """Raise what `eigenpairs` raises before it begins."""
     n = len(mass)
     if stiffness.shape != (n, n):
         raise ConfigError(f"{name}: the stiffness has shape {stiffness.shape}, but there are {n} masses")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from csm.errors import ConfigError, NumericalError
+from csm.errors import ConfigError, MeshError, NumericalError
 from csm.mesh.shape import Mesh
 from csm.operators import multilevel
 from csm.operators import operators as operators_module
@@ -87,6 +87,13 @@ def test_too_many_pairs_are_refused():
     mesh = sphere(1)
     with pytest.raises(ConfigError, match=r"asked for 10 eigenpairs from a coarse mesh of \d vertices"):
         multilevel_eigenpairs(stiffness(mesh), vertex_areas(mesh), 10, coarsen(mesh))
+
+
+def test_a_vertex_without_area_is_named():
+    mesh, areas = blob(4), vertex_areas(blob(4))
+    areas[7] = 0.0
+    with pytest.raises(MeshError, match=r"1 vertex has no area around them \(the first is vertex 7\)"):
+        multilevel_eigenpairs(stiffness(mesh), areas, 8, coarsen(mesh))
 
 
 @pytest.fixture
