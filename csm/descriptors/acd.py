@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any, ClassVar
 
 import numpy as np
@@ -156,7 +157,10 @@ class ACD(ByAngle):
         spectra = self._spectra(operators, most)
         ks = [min(k, most) for k in self._ks]
         damping = np.arange(1, self.order + 2) ** -self.damping
-        values = np.hstack([chebyshev_block(s.first(k), self.order) * damping for s in spectra for k in ks])
+        values = np.empty((operators.mesh.n_vertices, len(self.columns)))
+        blocks = np.split(values, len(spectra) * len(ks), axis=1)  # filled in place: of a big mesh two copies are large
+        for block, (spectrum, k) in zip(blocks, product(spectra, ks), strict=True):
+            block[:] = chebyshev_block(spectrum.first(k), self.order) * damping
         if self.centred:
             values -= operators.mass @ values / operators.mass.sum()
         return Features(unit_rows(values) if self.normalise else values, self.columns)
