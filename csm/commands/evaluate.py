@@ -40,7 +40,12 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     require_results(cfg.results)
     require_sound(data, exact=protocol.distance == "exact" and not protocol.fallback, train=False)
     tested = measure_all(method, data, protocol, matching=matching, table=cfg.table, device=cfg.device)
-    conclude(cfg, tested, f"{cfg.checkpoint}: {method.training.get('protocol', 'how it was trained is not known')}.")
+    trained, split = method.training.get("protocol", "how it was trained is not known"), data.split.label
+    if split not in trained:
+        print(
+            f"note: tested on the test shapes of split {split}, which is not the split of the training; see data.split"
+        )
+    conclude(cfg, tested, f"{cfg.checkpoint}: {trained}. Tested on the test shapes of split {split}.")
     return numbers(tested)
 
 

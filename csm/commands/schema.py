@@ -117,6 +117,9 @@ def require_in_ranges(plain: Mapping[str, Any]) -> None:
         there, value = _lookup(plain, key)
         if there and value != "???" and not wanted.holds(value):
             raise ConfigError(f"{key}={_shown(value)}: wanted {wanted}")
+    there, widths = _lookup(plain, "model.channels")
+    if there and isinstance(widths, list) and not (widths and all(map(_SOME.holds, widths))):
+        raise ConfigError(f"model.channels={_shown(widths)}: wanted one or more of: {_SOME}")
     for key in _FLAGS:
         if key in plain and not isinstance(plain[key], bool):
             raise ConfigError(f"{key}={_shown(plain[key])}: wanted true or false")

@@ -156,7 +156,7 @@ class ACD(ByAngle):
         most = min(self.k, operators.mesh.n_vertices)  # a cube has 8 vertices, and no more eigenpairs
         spectra = self._spectra(operators, most)
         ks = [min(k, most) for k in self._ks]
-        damping = np.arange(1, self.order + 2) ** -self.damping
+        damping = np.arange(1.0, self.order + 2) ** -self.damping
         values = np.empty((operators.mesh.n_vertices, len(self.columns)))
         blocks = np.split(values, len(spectra) * len(ks), axis=1)  # filled in place: of a big mesh two copies are large
         for block, (spectrum, k) in zip(blocks, product(spectra, ks), strict=True):

@@ -27,6 +27,12 @@ AUTO = "auto"
 
 _FREE = ("in_channels", "training.epochs", "training.command", "training.commit", "training.name")  # what may differ
 _PER_STEP = "training.shapes_per_step"  # checkpoints that do not say it have 1
+_OF_TRAINER = {
+    _PER_STEP: _PER_STEP,
+    "training.gradient_clip_val": "trainer.gradient_clip_val",
+    "training.limit_train_batches": "trainer.limit_train_batches",
+}
+_CALLED = _OF_TRAINER | {"training.epochs": "trainer.max_epochs, over which the schedule is laid out"}
 _FIXED_LENGTH = ("cosine", "step", "drop", "one_cycle")  # schedules that are laid out over all epochs
 
 
@@ -152,7 +158,9 @@ def require_same_settings(path: Path, module: CSMModule, epochs: int | None = No
     kept = {name: option.default for name, option in known if name in wanted} | kept
     differing = sorted(key for key in kept.keys() | wanted.keys() if kept.get(key) != wanted.get(key))
     changed = [key for key in differing if key not in _FREE]
-    if wanted.get(_PER_STEP) in (None, kept.get(_PER_STEP, 1)):
+    if _PER_STEP not in wanted:  # the module was made without a trainer
+        changed = [key for key in changed if key not in _OF_TRAINER]
+    elif wanted[_PER_STEP] == kept.get(_PER_STEP, 1):
         changed = [key for key in changed if key != _PER_STEP]
     if epochs is not None and module.schedule in _FIXED_LENGTH and kept.get("training.epochs") not in (None, epochs):
         changed.append("training.epochs")
@@ -170,7 +178,7 @@ def require_same_settings(path: Path, module: CSMModule, epochs: int | None = No
 
 
 def _called(key: str) -> str:
-    return "trainer.max_epochs, over which the schedule is laid out" if key == "training.epochs" else key
+    return _CALLED.get(key, key)
 
 
 def epochs_done(checkpoint: Mapping[str, Any]) -> int:

@@ -7,7 +7,7 @@ import sys
 import tempfile
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import lightning as L
 from lightning.fabric.utilities.exceptions import MisconfigurationException
@@ -50,6 +50,16 @@ def make_trainer(training: Training, folder: Path) -> L.Trainer:
 def shapes_per_step(trainer: L.Trainer) -> int:
     """Return over how many shapes the gradient of one step is taken."""
     return int(trainer.accumulate_grad_batches) * trainer.world_size
+
+
+def step_settings(trainer: L.Trainer) -> dict[str, Any]:
+    """Return what the trainer decides of the steps; what it leaves as it is by default is not in it."""
+    found: dict[str, Any] = {"shapes_per_step": shapes_per_step(trainer)}
+    if trainer.gradient_clip_val is not None:
+        found["gradient_clip_val"] = trainer.gradient_clip_val
+    if trainer.limit_train_batches != 1.0:
+        found["limit_train_batches"] = trainer.limit_train_batches
+    return found
 
 
 def _trainer(training: Training, folder: Path, keep: ModelCheckpoint) -> L.Trainer:

@@ -28,7 +28,7 @@ from csm.experiments.history import Curves, history_of
 from csm.experiments.ranks import prepare_once, require_same_begin
 from csm.experiments.resuming import AUTO, last_checkpoint, require_same_settings, resume_point
 from csm.experiments.tensorboard import TensorBoardPanels
-from csm.experiments.trainer import make_trainer, shapes_per_step
+from csm.experiments.trainer import make_trainer, step_settings
 from csm.learning.checkpoint import export_module
 from csm.learning.describer import Describer
 from csm.learning.loading import LightningData
@@ -147,7 +147,7 @@ def fit(training: Training, folder: Path, resume: Path | str | None = AUTO) -> T
 
 def _fit(training: Training, trainer: L.Trainer, folder: Path, resume: Path | str | None) -> Trained:
     begin = resume_point(folder, resume)
-    draft = sketch(training, trainer.max_epochs, shapes_per_step(trainer))
+    draft = sketch(training, trainer.max_epochs, step_settings(trainer))
     if begin:
         require_same_settings(begin, draft, trainer.max_epochs)
     elif trainer.max_epochs == 0 and next(draft.network.parameters(), None) is not None:
@@ -155,7 +155,7 @@ def _fit(training: Training, trainer: L.Trainer, folder: Path, resume: Path | st
     loaded = LightningData(training.data)
     prepare_once(trainer, loaded)
     require_same_begin(trainer, folder, begin)
-    module = make_module(training, loaded.n_features, trainer.max_epochs, shapes_per_step(trainer))
+    module = make_module(training, loaded.n_features, trainer.max_epochs, step_settings(trainer))
     if training.source is not None:
         with_classifier = take_over(module, training.source)
         _log.info(
@@ -183,12 +183,12 @@ def _fit(training: Training, trainer: L.Trainer, folder: Path, resume: Path | st
     return Trained(module, checkpoint, seconds, measured, trainer.global_rank, history.curves)
 
 
-def sketch(training: Training, epochs: int | None, per_step: int | None = None) -> CSMModule:
+def sketch(training: Training, epochs: int | None, steps: Mapping[str, Any] | None = None) -> CSMModule:
     """Make the module without memory for its weights: what does not fit fails here, before the preparation."""
     source = training.source
     try:
         with torch.device("meta"):
-            made = make_module(training, 1 if source is None else source.settings["in_channels"], epochs, per_step)
+            made = make_module(training, 1 if source is None else source.settings["in_channels"], epochs, steps)
     except (IndexError, RuntimeError, TypeError, ZeroDivisionError) as error:
         options = ", ".join(f"{key}={value}" for key, value in training.network.items())
         raise ConfigError(f"model: no network can be made with {options} ({error})") from error
@@ -223,11 +223,11 @@ def _interruptible() -> Iterator[None]:
 
 
 def make_module(
-    training: Training, n_features: int, epochs: int | None = None, per_step: int | None = None
+    training: Training, n_features: int, epochs: int | None = None, steps: Mapping[str, Any] | None = None
 ) -> CSMModule:
     """Make the untrained module of a training for input features of this width.
 
-    Its hyper-parameters tell the number of `epochs`, and over how many shapes the gradient of one step is taken.
+    Its hyper-parameters tell the number of `epochs`, and what the trainer makes of a step (`step_settings`).
     """
     data, made = training.data, provenance()
     return CSMModule(
@@ -245,7 +245,7 @@ def make_module(
             "protocol": data.protocol,
             "seed": training.seed,
             "epochs": epochs,
-            **({} if per_step is None else {"shapes_per_step": per_step}),
+            **(steps or {}),
             **training.begun,
             "command": made.command,
             "commit": made.commit,

@@ -151,7 +151,8 @@ def _compared(source: Subject, target: Subject, method: str) -> list[str]:
         poor = "; spectra of a part differ from those of the whole, so expect a poor map; for human bodies try model="
         said.append(
             f"{meshes[open_one].label} is open, {meshes[1 - open_one].label} is closed, or nearly so: if one is a part "
-            f"of the other, what is missing has no partner{'' if method == KNOWS_PARTS else poor + KNOWS_PARTS}"
+            "of the other, what is missing has no true partner, and a low confidence"
+            + ("" if method == KNOWS_PARTS else poor + KNOWS_PARTS)
         )
     parts = [body_of(mesh).n_components for mesh in meshes]
     if parts[0] != parts[1]:

@@ -31,6 +31,8 @@ SAME_PLACE = 1e-5
 STEPS = ("weld", "split", "debris", "orient")
 """The steps that can be left out; polygons, faces without three corners and vertices in no face always go."""
 
+_AS_A_WHOLE = "inside out as a whole, or a mirror image, of which left and right stay exchanged"
+
 
 @dataclass(frozen=True)
 class Mend:
@@ -267,7 +269,7 @@ class _Work:
         found = turns(self.vertices, self.faces)
         self.faces[found.flip] = self.faces[found.flip][:, ::-1]
         whole = found.n_inside_out
-        why = "inside out as a whole" if whole and found.flip.all() else "against their neighbours"
+        why = _AS_A_WHOLE if whole and found.flip.all() else "against their neighbours"
         self._did("orient", int(found.flip.sum()), "face", f"turned: {why}")
         if found.n_one_sided:
             text = counted(found.n_one_sided, "component is one-sided", "components are one-sided")

@@ -173,7 +173,8 @@ def losses_figure(curves: Mapping[str, Sequence[float]]) -> Figure:
     axes = figure.subplots()
     for k, (name, losses) in reversed(list(enumerate(curves.items()))):
         color, width, label = ("0.1", 1.8, name) if k == 0 else ("0.75", 0.9, None)
-        axes.plot(np.arange(1, len(losses) + 1), losses, color=color, lw=width, label=label)
+        dot = "o" if len(losses) == 1 else ""  # a line through one epoch is not to be seen
+        axes.plot(np.arange(1, len(losses) + 1), losses, color=color, lw=width, label=label, marker=dot, ms=4)
     axes.set_yscale("log")
     axes.set_xlabel("epoch", fontsize=9)
     axes.set_ylabel("loss", fontsize=9)

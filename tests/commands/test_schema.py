@@ -44,6 +44,8 @@ def test_experiments_are_valid(experiment):
         ("optimizer.lr=0", "optimizer.lr=0: wanted a number above 0"),
         ("optimizer.schedule=cosin", "optimizer.schedule=cosin: wanted constant, cosine, step, drop or one_cycle"),
         ("model.ks=0", "model.ks=0: wanted a whole number from 1"),
+        ("model.channels=[]", "model.channels=[]: wanted one or more of: a whole number from 1"),
+        ("model.channels=[16,0]", "model.channels=[16, 0]: wanted one or more of: a whole number from 1"),
         ("model.ks=many", "model.ks=many"),
         ("model.name=csmcn", "model.name=csmcn: there is no such network; did you mean csmcnn"),
         ("+model.depth=3", "model.depth: there is no such option"),

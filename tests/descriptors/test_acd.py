@@ -201,3 +201,8 @@ def test_each_component_has_the_spectrum_that_it_has_alone():
 def test_a_mesh_with_fewer_vertices_than_eigenpairs_uses_those_that_there_are():
     cube = trimesh.creation.box()
     assert ACD()(Mesh(cube.vertices, cube.faces)).shape == (8, 640)
+
+
+def test_a_whole_damping_is_a_number_as_others_are():
+    mesh = blob(2)
+    np.testing.assert_array_equal(ACD(damping=1)(mesh).values, ACD(damping=1.0)(mesh).values)

@@ -200,6 +200,20 @@ def test_a_training_of_several_shapes_per_step_goes_on_as_if_it_had_not_been_sto
     torch.testing.assert_close(fit(of(4), tmp_path / "cut").module.state_dict(), whole, rtol=0, atol=0)
 
 
+def test_what_the_trainer_makes_of_a_step_is_a_setting_too(tmp_path):
+    def of(**how):
+        return a_training(tmp_path, data=data, trainer=partial(L.Trainer, **(QUICK | {"max_epochs": 2} | how)))
+
+    data = toy_datamodule(tmp_path)
+    fit(of(limit_train_batches=1), tmp_path / "few")
+    fit(of(limit_train_batches=1), tmp_path / "few")
+    with pytest.raises(ConfigError, match=r"trainer\.limit_train_batches: 1 there, None wanted"):
+        fit(of(), tmp_path / "few")
+    fit(of(), tmp_path / "all")
+    with pytest.raises(ConfigError, match=r"trainer\.gradient_clip_val: None there, 0\.1 wanted"):
+        fit(of(gradient_clip_val=0.1), tmp_path / "all")
+
+
 def test_a_logger_whose_library_is_missing_is_said_in_a_sentence(tmp_path):
     def missing(save_dir):
         raise ModuleNotFoundError("No module named 'wandb'")

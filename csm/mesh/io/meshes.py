@@ -123,6 +123,8 @@ def _near(path: str) -> str:
 def _format(path: str) -> str:
     """Return the suffix that says the format, in lower case."""
     file = Path(path[:-3] if path.lower().endswith(".gz") else path)
+    if os.path.isdir(path):
+        raise MeshError(f"{path}: this is a folder, wanted a mesh; csm match folder={path} matches all that are in it")
     if file.suffix.lower() not in READABLE:
         raise MeshError(
             f"{path}: csm does not read {file.suffix or 'files without a suffix'}; wanted {_list(READABLE)}, "

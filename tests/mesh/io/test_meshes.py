@@ -62,6 +62,8 @@ def test_unknown_missing_and_empty_files(tmp_path):
         read_mesh(tmp_path / "a.fbx")
     with pytest.raises(MeshError, match="without a suffix"):
         read_mesh(tmp_path / "a")
+    with pytest.raises(MeshError, match="this is a folder, wanted a mesh; csm match folder="):
+        read_mesh(tmp_path)
     with pytest.raises(MeshError, match=r"spot_half\.of: there is no such file; did you mean spot_half\.off"):
         read_mesh(Path(__file__).parents[2] / "cases/spot_half.of")
 
