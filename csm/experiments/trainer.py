@@ -57,8 +57,8 @@ def step_settings(trainer: L.Trainer) -> dict[str, Any]:
     found: dict[str, Any] = {"shapes_per_step": shapes_per_step(trainer)}
     if trainer.gradient_clip_val is not None:
         found["gradient_clip_val"] = trainer.gradient_clip_val
-    if trainer.limit_train_batches != 1.0:
-        found["limit_train_batches"] = trainer.limit_train_batches
+    if isinstance(limit := trainer.limit_train_batches, int) or limit != 1.0:  # 1 is one batch, 1.0 all of them
+        found["limit_train_batches"] = limit
     return found
 
 

@@ -99,10 +99,10 @@ def test_a_checkpoint_evaluates_to_the_same_numbers_without_its_config(bench, tr
 def test_a_test_on_another_split_than_that_of_the_training_says_so(bench, trained, capsys):
     options = ["data=folder", "data.root=toys", "hydra.run.dir=splits", POINTS]
     bench.run("evaluate", "checkpoint=run/model.ckpt", "data.n_test=2", *options)
-    assert "not that of the training" not in capsys.readouterr().out
+    assert "not the split of the training" not in capsys.readouterr().out
     bench.run("evaluate", "checkpoint=run/model.ckpt", "data.n_test=3", *options)
     assert "3 test, " in (said := capsys.readouterr().out)
-    assert "which is not that of the training" in said
+    assert "which is not the split of the training" in said
     assert "Tested on the test shapes of split" in (bench.folder / "splits/report.html").read_text()
 
 
