@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.csgraph import dijkstra, reverse_cuthill_mckee
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import LinearOperator, cg, splu
 
 from csm._types import ComplexArray, FloatArray, IntArray
 from csm.operators._grids import Smoother
-from csm.operators.coarsening import spread_out
+from csm.operators.coarsening import cells, spread_out
 
 _REACH = 4  # edges of the dual graph within which no two faces stand for their surroundings
 _SMOOTHING = 3
@@ -71,11 +71,8 @@ def _carried(laplacian: sparse.csr_array) -> sparse.csr_array:
     off = entries.row != entries.col
     graph = sparse.csr_array((np.ones(off.sum()), (entries.row[off], entries.col[off])), shape=(n, n))
     seeds = spread_out(graph, _REACH)
-    _, before, nearest = dijkstra(graph, unweighted=True, indices=seeds, min_only=True, return_predecessors=True)
-    number = np.full(n, -1)
-    number[seeds] = np.arange(len(seeds))
-    values = _along_paths(laplacian, before.astype(np.int64))
-    return sparse.csr_array((values, (np.arange(n), number[nearest])), shape=(n, len(seeds)))
+    cell, before = cells(graph, seeds, unweighted=True)
+    return sparse.csr_array((_along_paths(laplacian, before), (np.arange(n), cell)), shape=(n, len(seeds)))
 
 
 def _along_paths(laplacian: sparse.csr_array, before: IntArray) -> ComplexArray:

@@ -62,8 +62,7 @@ def coarsen(mesh: Mesh, at_most: int = AT_MOST) -> Coarse:
     while len(seeds) > at_most and reach < 16:
         reach += 1
         seeds = spread_out(graph, reach)
-    cell = _cells(graph, seeds)
-    return Coarse(seeds, _interpolation(mesh, seeds, cell))
+    return Coarse(seeds, _interpolation(mesh, seeds, cells(graph, seeds)[0]))
 
 
 def spread_out(graph: sparse.csr_array, reach: int) -> IntArray:
@@ -94,13 +93,23 @@ def _spread(ring: sparse.csr_array, values: IntArray, reach: int) -> IntArray:
     return values
 
 
-def _cells(graph: sparse.csr_array, seeds: IntArray) -> IntArray:
-    """Return the number of the seed that is nearest to every vertex along the edges, shape (N,)."""
-    nearest = dijkstra(graph, indices=seeds, min_only=True, return_predecessors=True)[2]
+def cells(graph: sparse.csr_array, seeds: IntArray, *, unweighted: bool = False) -> tuple[IntArray, IntArray]:
+    """Return for each vertex of a graph the number of its nearest seed, and the vertex before it on the way from there.
+
+    Shape (N,) each; before a seed there is none, which is negative.  The way is along the edges, and each counts as one
+    where it is `unweighted`.
+
+    Examples
+    --------
+    >>> path = sparse.csr_array(sparse.diags_array([np.ones(4), np.ones(4)], offsets=[-1, 1]))
+    >>> cell, before = cells(path, np.array([0, 4]))
+    >>> cell[[0, 1, 3, 4]], before[[1, 3]]
+    (array([0, 0, 1, 1]), array([0, 4]))
+    """
+    _, before, nearest = dijkstra(graph, unweighted=unweighted, indices=seeds, min_only=True, return_predecessors=True)
     number = np.full(graph.shape[0], -1)
     number[seeds] = np.arange(len(seeds))
-    cell: IntArray = number[nearest]
-    return cell
+    return number[nearest], before.astype(np.int64)
 
 
 def _interpolation(mesh: Mesh, seeds: IntArray, cell: IntArray) -> sparse.csr_array:
