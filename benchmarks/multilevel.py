@@ -21,6 +21,7 @@ from scale import body
 
 from csm import Mesh, Operators, preset
 from csm._types import FloatArray
+from csm.descriptors.acd import chebyshev_block
 from csm.operators import linefield
 from csm.operators import operators as operators_module
 from csm.operators.spectrum import Spectrum
@@ -48,11 +49,7 @@ class Row:
 
 def described(spectra: list[Spectrum]) -> FloatArray:
     """Return the columns of ACD, T_0 to T_6 of every spectrum, times the root of the vertex areas."""
-    columns = []
-    for spectrum in spectra:
-        at = np.arccos(np.clip(2 * spectrum.evals / spectrum.evals[-1] - 1, -1, 1))
-        columns.append(spectrum.evecs**2 @ np.cos(np.outer(np.arange(7), at)).T)
-    return np.hstack(columns) * np.sqrt(spectra[0].mass)[:, None]
+    return np.hstack([chebyshev_block(spectrum, 6) for spectrum in spectra]) * np.sqrt(spectra[0].mass)[:, None]
 
 
 def functions(operators: Operators) -> list[Spectrum]:

@@ -39,7 +39,7 @@ class ByAngle(Descriptor):
 
     def _spectra(self, operators: Operators, k: int | None = None) -> list[Spectrum]:
         """Return the `k` smallest eigenpairs for each angle, by several threads, with a bar for big meshes."""
-        _ = operators.mass  # what all angles share is made before the threads begin
+        operators.share()
         if self.alpha > 0:
             operators.anisotropic(frame=self.frame, sweeps=self.sweeps, smoothing=self.smoothing)
         mesh, alone = operators.mesh, parent_process() is None  # a process of a parallel map has a bar for all shapes

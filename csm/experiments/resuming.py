@@ -165,7 +165,7 @@ def require_same_settings(path: Path, module: CSMModule, epochs: int | None = No
     if epochs is not None and module.schedule in _FIXED_LENGTH and kept.get("training.epochs") not in (None, epochs):
         changed.append("training.epochs")
     if changed:
-        told = "; ".join(f"{_called(key)}: {kept.get(key)} there, {wanted.get(key)} wanted" for key in changed)
+        told = "; ".join(f"{_CALLED.get(key, key)}: {kept.get(key)} there, {wanted.get(key)} wanted" for key in changed)
         raise ConfigError(
             f"{path}: was trained with other settings ({told}); go on with those, or begin anew (resume=null, or "
             "another folder)"
@@ -175,10 +175,6 @@ def require_same_settings(path: Path, module: CSMModule, epochs: int | None = No
             f"{path}: {done} epochs are done there, trainer.max_epochs={epochs} wants fewer; ask for more, or "
             "begin anew (resume=null, or another folder)"
         )
-
-
-def _called(key: str) -> str:
-    return _CALLED.get(key, key)
 
 
 def epochs_done(checkpoint: Mapping[str, Any]) -> int:

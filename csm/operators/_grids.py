@@ -28,8 +28,7 @@ class Smoother:
     def __init__(self, matrix: sparse.csr_array, degree: int) -> None:
         self._matrix, self._degree = matrix, degree
         diagonal = matrix.diagonal().real
-        self.strongest = _greatest(matrix, diagonal)
-        self.weights = 1 / (self.strongest * diagonal)
+        self.weights = 1 / (_greatest(matrix, diagonal) * diagonal)
 
     def __call__(self, columns: Columns) -> Columns:
         """Return a first approximation of the solution for right-hand sides of shape (N,) or (N, B)."""

@@ -143,6 +143,14 @@ class Operators:
                 self._areas[self.body.vertices] = self.body.operators.mass
         return self._areas
 
+    def share(self) -> None:
+        """Make what all spectra share, so that of several threads that ask for them no two make it."""
+        _ = self.mass
+        if self.body is not None:
+            self.body.operators.share()
+        elif self.mesh.n_vertices > DIRECT_UP_TO:
+            _ = self.coarse
+
     def anisotropic(
         self, *, frame: FrameKind = "line_field", sweeps: int = 3, smoothing: float = 0.08
     ) -> AnisotropicStiffness:
