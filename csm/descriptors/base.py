@@ -98,6 +98,9 @@ class Descriptor(ABC):
     by_component
         Whether it is evaluated on each component by itself, at the scale of the whole: the few smallest eigenvalues of
         a mesh of several components are those of the larger ones, and say nothing of the others.
+    turns
+        Whether it changes when the shape is turned, so that its neighbours are right only where both
+        shapes stand alike.
     name
         What stored results and checkpoints call the family.
     version
@@ -111,6 +114,7 @@ class Descriptor(ABC):
     version: ClassVar[int] = 1
     added: ClassVar[Mapping[str, Any]] = {}
     by_component: ClassVar[bool] = False
+    turns: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         """Raise a ConfigError if a parameter is not of the kind, or none of the words, of its annotation.

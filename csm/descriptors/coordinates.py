@@ -22,6 +22,7 @@ class Coordinates(Descriptor):
     """
 
     name: ClassVar[str] = "xyz"
+    turns: ClassVar[bool] = True
 
     def evaluate(self, operators: Operators) -> Features:
         """Return x, y and z of every vertex, (N, 3), in units of the square root of the area if that is 1."""

@@ -14,7 +14,14 @@ from csm.matching.base import Described, Matcher, require_device
 from csm.matching.both import BothWays, match_both_ways
 from csm.matching.confidence import share_returning
 from csm.matching.maps import VertexMap
-from csm.matching.methods import Method, PrecomputedMethod, as_method, describe_all, require_classifier
+from csm.matching.methods import (
+    DescriptorMethod,
+    Method,
+    PrecomputedMethod,
+    as_method,
+    describe_all,
+    require_classifier,
+)
 from csm.matching.nearest import nearest
 from csm.matching.parts import KNOWS_PARTS, likely_part
 from csm.matching.refinement.base import Refined, Refiner
@@ -105,7 +112,7 @@ def match_of(
     source, target = subjects
     forward, backward = on_given(found.forward, source, target), on_given(found.backward, target, source)
     features = _on_given_rows(described[0], source), _on_given_rows(described[1], target)
-    notes = (*filter(None, [why]), *_notes(source, target, method.name), *_against_input(*described))
+    notes = (*filter(None, [why]), *_notes(source, target, method), *_against_input(*described))
     return Match(source.given, target.given, forward, backward, method, matcher, notes, found.text, features)
 
 
@@ -137,9 +144,14 @@ def _on_given_rows(described: Described, subject: Subject) -> Float32Array:
     return np.where(at[:, None] >= 0, rows[at], np.float32(0))
 
 
-def _notes(source: Subject, target: Subject, method: str) -> tuple[str, ...]:
+def _notes(source: Subject, target: Subject, method: Method) -> tuple[str, ...]:
     said = [f"{subject.given.label}: {note}" for subject in (source, target) for note in subject.notes]
-    return tuple(dict.fromkeys([*said, *_compared(source, target, method)]))
+    if isinstance(method, DescriptorMethod) and method.descriptor.turns:
+        said.append(
+            f"{method.name} compares where vertices are in space: its neighbours return to their place even where they "
+            "are wrong, so its confidence, which goes by that, is too high"
+        )
+    return tuple(dict.fromkeys([*said, *_compared(source, target, method.name)]))
 
 
 def _compared(source: Subject, target: Subject, method: str) -> list[str]:

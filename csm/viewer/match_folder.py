@@ -156,6 +156,7 @@ def _account(match: Match, meaning: str, method: str) -> dict[str, Any]:
         "target": _of_mesh(match.target),
         "map": f"{meaning}; 0-based, -1 for none",
         "method": made_by(match, method),
+        "matcher": match.matcher.name,
         "parameters": dict(match.method.key),
         "unmatched": match.vertex_map.n_unmatched,
         "coverage": match.coverage,

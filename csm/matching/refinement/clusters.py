@@ -6,6 +6,7 @@ import torch
 from torch import Tensor
 
 from csm._types import IntArray
+from csm.matching.nearest import nearest
 from csm.matching.refinement.batch import nearest_rows
 
 LARGE = 2**29
@@ -17,10 +18,11 @@ _NEAR = 12  # clusters around that of a query which are searched
 def nearest_of_many(queries: Tensor, candidates: Tensor, seeds: IntArray, *, large: int = LARGE) -> Tensor:
     """Return the numbers of the nearest candidates (q, D) of queries (p, D), of many through clusters.
 
-    Up to `large` distances all are computed.  Above, each candidate belongs to the nearest of some of them, the seeds;
-    a query is compared with the candidates of the seed that is nearest to it and of the seeds around that.  What is
-    missed lies farther away than candidates of twelve clusters, which for rows of functions that are smooth on a
-    surface hardly happens: a test compares both ways.
+    Up to `large` distances all are computed, in float64 where rounding could decide, so that a shape is mapped to
+    itself by the identity.  Above, each candidate belongs to the nearest of some of them, the seeds; a query is
+    compared with the candidates of the seed that is nearest to it and of the seeds around that.  What is missed lies
+    farther away than candidates of twelve clusters, which for rows of functions that are smooth on a surface hardly
+    happens: a test compares both ways.
 
     Parameters
     ----------
@@ -32,7 +34,7 @@ def nearest_of_many(queries: Tensor, candidates: Tensor, seeds: IntArray, *, lar
         See above.
     """
     if len(queries) * len(candidates) <= large or len(seeds) <= _NEAR:
-        return nearest_rows(queries, candidates)
+        return torch.from_numpy(nearest(queries, candidates)).to(queries.device)
     centres = candidates[torch.from_numpy(seeds).to(candidates.device)]
     members = _by_cluster(nearest_rows(candidates, centres), len(seeds))
     asking = _by_cluster(nearest_rows(queries, centres), len(seeds))
