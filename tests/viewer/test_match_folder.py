@@ -19,6 +19,8 @@ from csm.viewer.match_folder import ACCOUNT, FILES, in_words, match_page, save_m
 from tests.shapes import blob
 from tests.viewer.test_scene import unpack
 
+ROOT = Path(__file__).parents[2]
+
 
 @pytest.fixture(scope="module")
 def match(tmp_path_factory) -> csm.Match:
@@ -34,6 +36,13 @@ def test_the_folder_holds_the_map_and_how_it_was_made(match, tmp_path):
     with np.load(tmp_path / "map.npz") as kept:
         np.testing.assert_array_equal(kept["indices"], match.indices)
     assert read_mesh(tmp_path / "source.ply").digest == blob(2).digest
+
+
+def test_the_tutorial_explains_every_key_of_the_account(match, tmp_path):
+    write_match(match, tmp_path, "the method in words", 1.234)
+    table = (ROOT / "docs" / "tutorial_match.md").read_text(encoding="utf-8").partition("`match.json` has")[2]
+    explained = {key for line in table.splitlines() if line.startswith("| `") for key in line.split("|")[1].split("`")}
+    assert set(json.loads((tmp_path / ACCOUNT).read_text())) <= explained
 
 
 def test_an_unknown_time_is_left_out_and_the_method_is_said(match, tmp_path):
