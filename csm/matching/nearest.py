@@ -75,7 +75,7 @@ def nearest(queries: Rows, candidates: Rows, *, at: IntArray | None = None, bloc
         return found
     if q.dtype != c.dtype:
         q, c = q.astype(np.float64), c.astype(np.float64)
-    _require_finite(bool(np.isfinite(q).all() and np.isfinite(c).all()))
+    _require_finite(bool(np.isfinite([f(initial=0) for rows in (q, c) for f in (rows.min, rows.max)]).all()))
     q, c = _of_usual_size(q, c)
     return _search(q, c, c.mean(0), max(1, min(block, _MAX_ELEMENTS // len(c))))
 
@@ -106,22 +106,23 @@ def _search(q: NDArray[Any], c: NDArray[Any], centre: NDArray[Any], block: int) 
     The scores of a block of queries, half the squared distances less |q|^2 / 2, are a product of matrices; what follows
     reads them once, for the least of every 32 candidates, and looks closer where that tells it to.
     """
-    queries, table, largest = _factors(q - centre, c - centre)
+    table, largest = _table(c - centre)
     groups = table.shape[1] // _GROUP
     rounding = 4.0 * np.sqrt(c.shape[1]) * np.finfo(c.dtype).eps * largest
-    limits = rounding * (np.linalg.norm(queries[:, :-1], axis=1) + largest)
     first = np.empty(len(q), dtype=np.int64)
-    scores = np.empty((min(block, len(q)), table.shape[1]), dtype=c.dtype)  # one piece of memory for all blocks
+    size = min(block, len(q))  # one piece of memory for all blocks
+    queries, scores = np.ones((size, len(table)), dtype=c.dtype), np.empty((size, table.shape[1]), dtype=c.dtype)
     for begin in range(0, len(q), block):
-        part = queries[begin : begin + block]
+        part = queries[: len(q) - begin]
         score = scores[: len(part)]
+        np.subtract(q[begin : begin + block], centre, out=part[:, :-1])
         np.matmul(part, table, out=score)
         grouped = score.reshape(len(part), _GROUP, groups)
         least = grouped.min(axis=1)
         best = least.argmin(1)
         within = grouped[np.arange(len(part)), :, best]
         first[begin : begin + block] = within.argmin(1) * groups + best
-        limit = (least.min(1) + limits[begin : begin + block])[:, None]
+        limit = (least.min(1) + rounding * (np.linalg.norm(part[:, :-1], axis=1) + largest))[:, None]
         several = [np.count_nonzero(each <= limit, axis=1) > 1 for each in (least, within)]
         unsure = np.flatnonzero(several[0] | several[1])
         if len(unsure):
@@ -130,16 +131,17 @@ def _search(q: NDArray[Any], c: NDArray[Any], centre: NDArray[Any], block: int) 
     return first
 
 
-def _factors(q: NDArray[Any], c: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], float]:
-    """Return matrices whose product is |c|^2 / 2 - q c, infinite in columns that fill a group, and the greatest |c|."""
+def _table(c: NDArray[Any]) -> tuple[NDArray[Any], float]:
+    """Return a matrix whose product with rows (q, 1) is |c|^2 / 2 - q c, and the greatest |c|.
+
+    Its columns that fill a group make it infinite.
+    """
     (n, width), fill = c.shape, -len(c) % _GROUP
     half_norms = 0.5 * np.einsum("ij,ij->i", c, c)
     table = np.zeros((n + fill, width + 1), dtype=c.dtype)
     np.negative(c, out=table[:n, :-1])
     table[:n, -1], table[n:, -1] = half_norms, np.inf
-    queries = np.ones((len(q), width + 1), dtype=q.dtype)
-    queries[:, :-1] = q
-    return queries, table.T, float(np.sqrt(half_norms.max()))
+    return table.T, float(np.sqrt(half_norms.max()))
 
 
 def _first_of(near: NDArray[np.bool_], q: NDArray[Any], c: NDArray[Any], centre: NDArray[Any], block: int) -> IntArray:

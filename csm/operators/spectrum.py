@@ -88,9 +88,10 @@ def eigenpairs(
     """Return the `k` smallest eigenpairs of  S phi = lambda diag(mass) phi.
 
     Shift-invert Lanczos from a fixed start on one BLAS thread, or a dense solver for small meshes.  The answer is
-    accepted only if residuals and orthonormality hold and no eigenvalue was passed over (Sylvester's law of inertia:
-    the signs of a factorisation count the eigenvalues below a bound).  Single Lanczos vectors pass over copies of an
-    eigenvalue, so blocks of them follow where the count says so; if those fail, it is tried again, at most twice, which
+    accepted only if residuals and orthonormality hold (where slivers make the matrix so stiff that rounding alone
+    leaves more, the residual of the inverse) and no eigenvalue was passed over (Sylvester's law of inertia: the signs
+    of a factorisation count the eigenvalues below a bound).  Single Lanczos vectors pass over copies of an eigenvalue,
+    so blocks of them follow where the count says so; if those fail, it is tried again, at most twice, which
     `Spectrum.notes` records.
 
     Parameters

@@ -14,7 +14,7 @@ from csm.operators import _eigensolver as solver
 from csm.operators._factors import Factors
 from csm.operators.laplacian import stiffness, vertex_areas
 from csm.operators.operators import Operators
-from csm.operators.spectrum import Spectrum, eigenpairs
+from csm.operators.spectrum import Spectrum, eigenpairs, symmetrised
 from tests.shapes import blob, plane, sphere, torus
 
 
@@ -53,6 +53,26 @@ def test_against_the_dense_generalised_problem(k):
     overlap = np.abs(found.evecs.T @ (vertex_areas(mesh)[:, None] * vectors[:, :k]))
     np.testing.assert_allclose(np.diag(overlap), 1, atol=1e-6)
     assert found.notes == ()
+
+
+def test_the_tiny_edges_of_marching_cubes_are_no_obstacle(caplog):
+    mesh = blob(4)
+    vertices = mesh.vertices.copy()
+    for centre in (0, 700, 1500):  # all faces around it become tiny
+        ring = np.unique(mesh.faces[(mesh.faces == centre).any(axis=1)])
+        vertices[ring] = vertices[centre] + 1e-5 * (vertices[ring] - vertices[centre])
+    mesh = Mesh(vertices, mesh.faces, "tiny edges")
+    with caplog.at_level(logging.WARNING):
+        found = solve(mesh, 60)
+    matrix = symmetrised(stiffness(mesh), 1 / np.sqrt(vertex_areas(mesh)))
+    assert abs(matrix).max() > 1e9 * found.evals[-1]  # so that rounding alone exceeds a residual of 1e-7
+    assert found.residual > 1e-7
+    assert not found.notes
+    assert not caplog.records
+    values = scipy.linalg.eigvalsh(matrix.toarray())[:60]
+    np.testing.assert_allclose(found.evals, values, rtol=1e-4, atol=1e-3)  # the dense solver's own rounding
+    gram = found.evecs.T @ (found.mass[:, None] * found.evecs)
+    np.testing.assert_allclose(gram, np.eye(60), atol=1e-8)
 
 
 def test_lanczos_finds_more_copies_of_an_eigenvalue_than_its_blocks_have_columns():
