@@ -68,7 +68,8 @@ def growth_megabytes(run: Run) -> float:
 
 def write(name: str, chosen: argparse.Namespace, size: Mapping[str, float], rows: Sequence[Any]) -> None:
     """Write the rows with the size of the problem, the command and the versions."""
-    command = f"python benchmarks/{name}.py --threads {chosen.threads} --repeats {chosen.repeats}"
+    sizes = f" --sizes {' '.join(map(str, chosen.sizes))}" if "sizes" in chosen else ""
+    command = f"python benchmarks/{name}.py --threads {chosen.threads} --repeats {chosen.repeats}{sizes}"
     made = asdict(replace(provenance(), command=command))
     content = {**size, "threads": chosen.threads, "repeats": chosen.repeats, **made}
     with atomic_path(chosen.out) as temporary:
