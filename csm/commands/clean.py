@@ -40,7 +40,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     )
     write_cleaned(done, source, target, len(mesh.sizes))
     report(done, source, target)
-    return {"vertices": done.mesh.n_vertices, "faces": done.mesh.n_faces, "steps": len(done.mends)}
+    return {"vertices": done.mesh.n_vertices, "faces": done.mesh.n_faces, "steps": len(done.changes)}
 
 
 def places(target: Path) -> list[Path]:
@@ -85,7 +85,7 @@ def report(done: Cleaned, source: Path, target: Path) -> None:
         print(f"{mend.kind:<13} {mend.text}")
     remaining = [finding.text for finding in check(done.mesh)]
     print(
-        "nothing had to be mended" if not done.mends else f"{counted(len(done.mends), 'step')} changed the mesh",
+        "nothing had to be mended" if not done.changes else f"{counted(len(done.changes), 'step')} changed the mesh",
         end="; ",
     )
     print("no problems remain" if not remaining else f"what remains: {'; '.join(remaining)}")

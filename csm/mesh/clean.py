@@ -3,7 +3,7 @@
 Nothing here is done unasked: vertex numbers are the ground truth, so reading never repairs.  `clean` returns a new mesh
 and both maps, with which labels and correspondences carry over in either direction.
 
-In this order: polygons become triangles; boundary vertices at the same place are welded; faces without three different
+In this order: polygons become triangles; boundary edges at the same place are welded; faces without three different
 corners and repeated faces go; vertices with faces of zero area only are joined with their nearest neighbour;
 non-manifold edges and vertices are cut apart; debris goes; vertices in no face go; faces are oriented alike, and
 outwards where the surface is closed.
@@ -26,7 +26,7 @@ from csm.mesh.polygons import PolygonMesh, triangulated
 from csm.mesh.shape import Mesh
 
 SAME_PLACE = 1e-5
-"""Distance below which boundary vertices are welded, as a fraction of the bounding box's diagonal."""
+"""Distance below which the ends of boundary edges are at the same place, as a fraction of the bounding box's diagonal."""
 
 STEPS = ("weld", "split", "debris", "orient")
 """The steps that can be left out; polygons, faces without three corners and vertices in no face always go."""
@@ -66,6 +66,11 @@ class Cleaned:
     origin: IntArray
     face_map: IntArray
     mends: tuple[Mend, ...] = ()
+
+    @property
+    def changes(self) -> tuple[Mend, ...]:
+        """What of `mends` changed the mesh: all but the note that a component is one-sided."""
+        return tuple(mend for mend in self.mends if mend.kind != "one_sided")
 
     @property
     def text(self) -> str:

@@ -33,9 +33,10 @@ def sides(faces: IntArray, n: int) -> Sides:
 
 
 def welded(vertices: FloatArray, faces: IntArray, tolerance: float) -> IntArray:
-    """Return for each vertex the first one at the same place, shape (N,), where both lie on a boundary, else itself.
+    """Return for each vertex the first one that it is welded to, itself if to none; shape (N,).
 
-    Vertices away from boundaries stay: parts that merely touch are not joined.
+    Boundary edges that run between the same places are joined, and their ends with them.  Parts that merely touch in a
+    vertex, or away from boundaries, are not joined: they would have to be cut apart again.
 
     Parameters
     ----------
@@ -44,9 +45,24 @@ def welded(vertices: FloatArray, faces: IntArray, tolerance: float) -> IntArray:
     tolerance
         What counts as the same place, as a fraction of the diagonal of the bounding box.
     """
-    first = np.arange(len(vertices))
     side = sides(faces, len(vertices))
-    border = np.unique(np.concatenate([side.tails[side.uses == 1], side.heads[side.uses == 1]]))
+    border = np.flatnonzero((side.uses == 1) & (side.tails != side.heads))
+    tails, heads = side.tails[border], side.heads[border]
+    place = _places(vertices, np.unique(np.concatenate([tails, heads])), tolerance)
+    turned = place[tails] > place[heads]
+    starts, ends = np.where(turned, heads, tails), np.where(turned, tails, heads)
+    keys = edge_keys(place[starts], place[ends], len(vertices))
+    order = np.argsort(keys, kind="stable")
+    order = order[(place[starts] != place[ends])[order]]  # an edge within one place has no direction to be joined in
+    same = np.flatnonzero(np.diff(keys[order]) == 0)
+    a, b = order[same], order[same + 1]
+    group = components(np.r_[starts[a], ends[a]], np.r_[starts[b], ends[b]], len(vertices))
+    return np.unique(group, return_index=True)[1][group]
+
+
+def _places(vertices: FloatArray, border: IntArray, tolerance: float) -> IntArray:
+    """Return for each vertex of a boundary the first such vertex at the same place, else itself; shape (N,)."""
+    first = np.arange(len(vertices))
     border = border[np.isfinite(vertices[border]).all(axis=1)]
     if border.size == 0:
         return first

@@ -99,6 +99,31 @@ def test_polygons_are_triangulated_and_the_face_map_names_them():
     assert (np.sort(done.face_map) == np.repeat(np.arange(n), 2)).all()
 
 
+def test_what_was_cut_apart_is_not_welded_again():
+    square = plane(6)
+    inner, rim = [14, 15], [0, 1]
+    fins = np.vstack([square.vertices, square.vertices[[inner[0], rim[0]]] + [0, 0, 1.0], [[-1, -1, 0], [-1, 0, 0]]])
+    faces = np.vstack([square.faces, [[*inner, 36], [*rim, 37], [*rim[::-1], 37], [rim[0], 38, 39], [14, 8, 36]]])
+    once = clean(Mesh(fins, faces))
+    assert "split" in {mend.kind for mend in once.mends}
+    again = clean(once.mesh)
+    assert again.mesh is once.mesh
+    assert again.mends == ()
+
+
+def test_a_one_sided_mesh_is_not_said_to_be_changed():
+    t = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    rims = [
+        np.stack([(2 + s * np.cos(t / 2)) * np.cos(t), (2 + s * np.cos(t / 2)) * np.sin(t), s * np.sin(t / 2)], 1)
+        for s in (-1, 1)
+    ]
+    a, b = np.arange(24), np.arange(24) + 24
+    c, d = np.r_[a[1:], b[0]], np.r_[b[1:], a[0]]
+    done = clean(Mesh(np.vstack(rims), np.vstack([np.stack([a, b, c], 1), np.stack([b, d, c], 1)])))
+    assert clean(done.mesh).changes == ()
+    assert [mend.kind for mend in clean(done.mesh).mends] == ["one_sided"]
+
+
 def test_vertices_with_flat_faces_only_are_joined_with_a_neighbour():
     square = plane(6)
     spike = np.vstack([square.vertices, square.vertices[14]])

@@ -39,6 +39,17 @@ def test_closed_parts_that_touch_stay_apart():
     assert (welded(both, twice, 1e-7) == np.arange(len(both))).all()
 
 
+def test_open_parts_that_meet_in_a_vertex_or_at_an_inner_edge_stay_apart():
+    square = plane(5)
+    corner = np.vstack([square.vertices, square.vertices - [1, 1, 0]])
+    twice = np.vstack([square.faces, square.faces + 25])
+    assert (welded(corner, twice, 1e-7) == np.arange(50)).all()
+    fin = np.vstack([square.vertices, square.vertices[[6, 7]], square.vertices[6] + [0, 0, 1.0]])
+    assert (welded(fin, np.vstack([square.faces, [[25, 26, 27]]]), 1e-7) == np.arange(28)).all()
+    beside = np.vstack([square.vertices, square.vertices + [1, 0, 0]])
+    assert len(np.unique(welded(beside, twice, 1e-7))) == 45
+
+
 def test_sound_faces_have_three_corners_once():
     faces = np.array([[0, 1, 2], [2, 1, 0], [1, 1, 3], [1, 3, 2], [0, 1, 2]])
     assert sound_faces(faces).tolist() == [True, False, False, True, False]
