@@ -20,6 +20,7 @@ from csm.evaluation.provenance import provenance
 from csm.mesh.check import check
 from csm.mesh.clean import Cleaned, clean
 from csm.mesh.io import file_digest, read_polygons, write_map, write_mesh
+from csm.mesh.io.extras import Extras, read_extras
 from csm.mesh.io.owned import require_not_input, require_own
 
 
@@ -38,8 +39,9 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     done = clean(
         mesh, weld=cfg.weld, split=cfg.split, debris=cfg.debris, orient=cfg.orient, tolerance=float(cfg.tolerance)
     )
-    write_cleaned(done, source, target, len(mesh.sizes))
-    report(done, source, target)
+    extras = carried(read_extras(source), done, target)
+    write_cleaned(done, source, target, len(mesh.sizes), extras)
+    report(done, source, target, extras)
     return {"vertices": done.mesh.n_vertices, "faces": done.mesh.n_faces, "steps": len(done.changes)}
 
 
@@ -53,10 +55,19 @@ def account_of(target: Path) -> Path:
     return target.with_name(f"{target.stem}.clean.json")
 
 
-def write_cleaned(done: Cleaned, source: Path, target: Path, n_faces: int) -> None:
+def carried(extras: Extras, done: Cleaned, target: Path) -> Extras:
+    """Return the colours of the new vertices, if the format has them, and the names of what is not carried over."""
+    if extras.colors is None:
+        return extras
+    if target.suffix.lower() == ".obj":
+        return Extras(others=("colours", *extras.others))
+    return Extras(extras.colors[done.origin], extras.others)
+
+
+def write_cleaned(done: Cleaned, source: Path, target: Path, n_faces: int, extras: Extras) -> None:
     """Write the mesh, the maps and the account."""
     mesh_file, old_to_new, new_to_old = places(target)
-    write_mesh(mesh_file, done.mesh)
+    write_mesh(mesh_file, done.mesh, extras.colors)
     forward = f"line i = vertex of {target.name} that vertex i of {source.name} has become"
     backward = f"line i = vertex of {source.name} that vertex i of {target.name} was"
     write_map(old_to_new, done.vertex_map, meaning=forward)
@@ -68,6 +79,8 @@ def write_cleaned(done: Cleaned, source: Path, target: Path, n_faces: int) -> No
         "steps": [{"kind": mend.kind, "count": mend.count, "text": mend.text} for mend in done.mends],
         "vertices": {"before": len(done.vertex_map), "after": done.mesh.n_vertices},
         "faces": {"before": n_faces, "after": done.mesh.n_faces},
+        "carried_over": [] if extras.colors is None else ["colours"],
+        "not_carried_over": list(extras.others),
         "findings": [finding.text for finding in check(done.mesh)],
         "files": {path.name: file_digest(path) for path in places(target)},
         "command": made.command,
@@ -77,10 +90,17 @@ def write_cleaned(done: Cleaned, source: Path, target: Path, n_faces: int) -> No
     write_json(account_of(target), account)
 
 
-def report(done: Cleaned, source: Path, target: Path) -> None:
+def report(done: Cleaned, source: Path, target: Path, extras: Extras) -> None:
     """Print what was done and what remains."""
     for note in done.mesh.notes:
         print(f"note: {source}: {note}")
+    if extras.colors is not None:
+        print(f"note: {source}: the colours of its vertices are carried over")
+    if extras.others:
+        print(
+            f"note: {source}: what else it says of its vertices is not carried over: {', '.join(extras.others)}; "
+            f"{places(target)[2].name} says which vertex each was"
+        )
     for mend in done.mends:
         print(f"{mend.kind:<13} {mend.text}")
     remaining = [finding.text for finding in check(done.mesh)]

@@ -16,6 +16,8 @@ import torch
 
 from csm.commands import app
 from csm.mesh.io import read_mesh, write_mesh
+from csm.mesh.io.extras import read_extras
+from csm.mesh.shape import Mesh
 from tests.commands.test_pipeline import SMALL
 from tests.shapes import blob
 from tests.toyset import write_toys
@@ -139,6 +141,29 @@ def test_clean_writes_the_mesh_its_maps_and_an_account(csm, tmp_path):
     there = np.loadtxt(tmp_path / "clean.old_to_new.txt", dtype=int)
     np.testing.assert_array_equal(read_mesh(tmp_path / "clean.ply").vertices[there], corners)
     assert csm("clean", "soup.obj", "clean.ply")[0] == 0
+
+
+def test_clean_carries_colours_over_and_says_what_it_leaves_out(csm, tmp_path):
+    mesh = blob(1)
+    colors = np.random.default_rng(0).integers(0, 256, (mesh.n_vertices, 3)).astype(np.uint8)
+    lone = Mesh(np.vstack([[[9.0, 9, 9]], mesh.vertices]), mesh.faces + 1)
+    write_mesh(tmp_path / "a.ply", lone, np.vstack([[[0, 0, 0]], colors]).astype(np.uint8))
+    status, out, _ = csm("clean", "a.ply", "b.ply")
+    assert status == 0
+    assert "note: a.ply: the colours of its vertices are carried over" in out
+    np.testing.assert_array_equal(read_extras(tmp_path / "b.ply").colors, colors)
+    assert json.loads((tmp_path / "b.clean.json").read_text())["carried_over"] == ["colours"]
+    out = csm("clean", "a.ply", "c.obj")[1]
+    assert "is not carried over: colours; c.new_to_old.txt says which vertex each was" in out
+    assert json.loads((tmp_path / "c.clean.json").read_text())["not_carried_over"] == ["colours"]
+
+
+def test_clean_of_what_it_wrote_says_that_nothing_was_to_be_done(csm, tmp_path):
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 1]])
+    write_mesh(tmp_path / "a.off", Mesh(corners, np.array([[0, 1, 2], [0, 2, 3], [0, 1, 4], [0, 5, 6]])))
+    assert "changed the mesh" in csm("clean", "a.off", "b.off", "debris=0")[1]
+    assert "nothing had to be mended" in csm("clean", "b.off", "c.off", "debris=0")[1]
+    assert (tmp_path / "b.off").read_bytes() == (tmp_path / "c.off").read_bytes()
 
 
 def test_describe_gives_rows_for_the_vertices_of_the_file(csm, tmp_path):
