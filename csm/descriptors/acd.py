@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import product
@@ -9,14 +10,19 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from csm._counts import counted
 from csm._types import FloatArray, IntArray
 from csm.descriptors.angular import ByAngle
-from csm.descriptors.base import Features
+from csm.descriptors.base import Features, as_operators
 from csm.descriptors.stack import Stack
 from csm.errors import ConfigError
+from csm.mesh.debris import component_areas
+from csm.mesh.inputs import MeshLike
 from csm.operators.frames import FrameKind
 from csm.operators.operators import Operators
 from csm.operators.spectrum import Spectrum
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -63,7 +69,8 @@ class ACD(ByAngle):
     and wolves.  `paper` has the settings of the text of the paper (140 columns), `release` those of its published code
     (48 columns).
 
-    Each component of a mesh has its own spectrum, and one with fewer vertices than K all the eigenpairs that it has.
+    Each component of a mesh has its own spectrum, and one with fewer vertices than K all the eigenpairs that it has,
+    which is logged (the isotropic signatures refuse such a mesh).
 
     Block j of a mirror image is block -j mod J of the original.  Faces must be oriented outwards: inside out, convex
     and concave change places as well, and the block of theta is the original's of pi/2 - theta.
@@ -150,6 +157,25 @@ class ACD(ByAngle):
             return super().mirrored_columns()
         columns = np.arange(len(self.columns)).reshape(self.angles, -1)
         return columns[-np.arange(self.angles) % self.angles].ravel()
+
+    def __call__(self, shape: MeshLike | Operators) -> Features:
+        """Evaluate as every descriptor, and log it where a mesh has fewer eigenpairs than `k`."""
+        operators = as_operators(shape)
+        if operators.body is None:  # the body of a mesh with debris comes here by itself
+            self._log_fewer(operators)
+        return super().__call__(operators)
+
+    def _log_fewer(self, operators: Operators) -> None:
+        mesh, several = operators.mesh, operators.n_components > 1
+        sizes = np.bincount(component_areas(mesh)[0]) if several else np.array([mesh.n_vertices])
+        few = int((sizes < self.k).sum())
+        if few:
+            short = counted(few, "component has", "components have") if several else "the mesh has"
+            _log.warning(
+                "%s: %s fewer vertices than the %s eigenpairs that are asked for (descriptor.k); acd takes as many as "
+                "there are vertices (%s)",
+                *(mesh.label, short, self.k, sizes.min()),
+            )
 
     def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, one column per name, in units of 1/area unless normalised."""

@@ -26,7 +26,7 @@ from csm.mesh.polygons import PolygonMesh, triangulated
 from csm.mesh.shape import Mesh
 
 SAME_PLACE = 1e-5
-"""Distance below which the ends of boundary edges are at the same place, as a fraction of the bounding box's diagonal."""
+"""Distance below which ends of boundary edges are welded, as a fraction of the bounding box's diagonal."""
 
 STEPS = ("weld", "split", "debris", "orient")
 """The steps that can be left out; polygons, faces without three corners and vertices in no face always go."""

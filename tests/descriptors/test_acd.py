@@ -198,9 +198,22 @@ def test_each_component_has_the_spectrum_that_it_has_alone():
     assert len(np.unique(np.round(values[big.n_vertices :], 6), axis=0)) > 8
 
 
-def test_a_mesh_with_fewer_vertices_than_eigenpairs_uses_those_that_there_are():
+def test_a_mesh_with_fewer_vertices_than_eigenpairs_uses_those_that_there_are_and_says_so_once(caplog):
     cube = trimesh.creation.box()
-    assert ACD()(Mesh(cube.vertices, cube.faces)).shape == (8, 640)
+    box = Mesh(cube.vertices, cube.faces, "box")
+    assert ACD()(box).shape == (8, 640)
+    assert [record.getMessage() for record in caplog.records] == [
+        "box: the mesh has fewer vertices than the 11 eigenpairs that are asked for (descriptor.k); acd takes as many "
+        "as there are vertices (8)"
+    ]
+    caplog.clear()
+    ACD(k=8)(box)
+    assert not caplog.records
+    ball = blob(2)
+    both = Mesh(np.vstack([ball.vertices, box.vertices + 5]), np.vstack([ball.faces, box.faces + ball.n_vertices]), "x")
+    ACD()(both)
+    assert len(caplog.records) == 1
+    assert "x: 1 component has fewer vertices than the 11 eigenpairs" in caplog.text
 
 
 def test_a_whole_damping_is_a_number_as_others_are():

@@ -46,7 +46,7 @@ def test_open_parts_that_meet_in_a_vertex_or_at_an_inner_edge_stay_apart():
     assert (welded(corner, twice, 1e-7) == np.arange(50)).all()
     fin = np.vstack([square.vertices, square.vertices[[6, 7]], square.vertices[6] + [0, 0, 1.0]])
     assert (welded(fin, np.vstack([square.faces, [[25, 26, 27]]]), 1e-7) == np.arange(28)).all()
-    beside = np.vstack([square.vertices, square.vertices + [1, 0, 0]])
+    beside = np.vstack([square.vertices, square.vertices + np.array([1, 0, 0])])
     assert len(np.unique(welded(beside, twice, 1e-7))) == 45
 
 

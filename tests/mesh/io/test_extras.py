@@ -54,5 +54,5 @@ def test_what_an_off_has_besides_and_files_of_other_formats(tmp_path):
     np.savez(tmp_path / "c.npz", vertices=MESH.vertices, faces=MESH.faces)
     assert read_extras(tmp_path / "c.npz").others == ()
     (tmp_path / "d.ply").write_text("nonsense")
-    with pytest.raises(MeshError, match="d.ply"):
+    with pytest.raises(MeshError, match=r"d\.ply"):
         read_extras(tmp_path / "d.ply")
