@@ -34,7 +34,7 @@ def require_own(outputs: Iterable[Path], account: Path, overwrite: bool = False,
     Raises
     ------
     DataError
-        With the first such file.
+        With the first such file, or where a match of another kind is in the folder.
     """
     if overwrite:
         return
@@ -46,6 +46,16 @@ def require_own(outputs: Iterable[Path], account: Path, overwrite: bool = False,
             raise DataError(f"{path}: there is such a file, which {why}; {remedy}")
     if os.path.lexists(account) and not files:
         raise DataError(f"{account}: there is such a file, which was not written by csm here; {remedy}")
+    _require_alone(account, remedy)
+
+
+def _require_alone(account: Path, remedy: str) -> None:
+    """Raise if the result of the other kind of match is in the folder: which files are whose could not be told."""
+    other = {MATCH: COLLECTION, COLLECTION: MATCH}.get(account.name)
+    if other and files_of(account.parent / other):
+        what = "a match of two meshes" if other == MATCH else "a matched folder"
+        instead = remedy.replace("to replace it", "to have both in it")
+        raise DataError(f"{account.parent}: this folder has the files of {what} ({other}); {instead}")
 
 
 def require_not_input(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:

@@ -46,6 +46,18 @@ def test_a_json_of_somebody_else_is_not_replaced(tmp_path, content):
         require_own([tmp_path / "map.txt"], tmp_path / "match.json", False)
 
 
+@pytest.mark.parametrize(("one", "other"), [("match.json", "collection.json"), ("collection.json", "match.json")])
+def test_a_folder_has_one_kind_of_match(tmp_path, one, other):
+    (tmp_path / one).write_text('{"files": {}}')
+    require_own([], tmp_path / other)
+    (tmp_path / one).write_text('{"files": {"map.txt": "0123"}}')
+    with pytest.raises(DataError, match=rf"{one}.*overwrite=True to have both in it"):
+        require_own([], tmp_path / other)
+    require_own([], tmp_path / other, overwrite=True)
+    require_own([], tmp_path / one)
+    require_own([], tmp_path / "a.clean.json")
+
+
 def test_what_is_no_file_is_not_replaced(tmp_path):
     os.mkfifo(tmp_path / "map.txt")
     with pytest.raises(DataError, match=r"map\.txt"):
