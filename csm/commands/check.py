@@ -24,7 +24,10 @@ from csm.data.registry import find_sets, layouts, recognise
 from csm.errors import ConfigError, CsmError, DataError
 from csm.matching.subjects import subject_of
 from csm.mesh.check import Finding, require_usable
-from csm.mesh.io import READABLE, list_files
+from csm.mesh.io import READABLE
+from csm.mesh.io.listing import listed_meshes
+
+_NO_MESHES = f"there are no meshes in this folder; csm reads {', '.join(READABLE)}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,19 +59,22 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     paths = [Path(path) for path in [*cfg.paths, *([cfg.folder] if cfg.folder else [])]]
     if not paths:
         raise ConfigError("check needs meshes: csm check FOLDER, or csm check a.off b.ply")
-    gone = next((path for path in paths if not os.path.lexists(path)), None)
-    if gone is not None:
-        raise DataError(f"{gone}: there is no such file or folder")
+    if len(paths) == 1 and not os.path.lexists(paths[0]):
+        raise DataError(f"{paths[0]}: there is no such file or folder")
     if cfg.use not in (None, "train", "match"):
         raise ConfigError(f"use={cfg.use}: wanted train, match or null")
     if len(paths) == 1 and paths[0].is_dir() and cfg.use != "match":
         try:
             report = check_folder(paths[0])
         except DataError as error:
-            if cfg.use != "train" and (below := find_sets(paths[0])):
+            below = find_sets(paths[0])
+            if cfg.use != "train" and below:
                 return _list(below)
-            if cfg.use == "train" or not list_files(paths[0], *READABLE):
+            if not below and not listed_meshes(paths[0]).files:
                 print("\n".join(_known_sets()))
+                said = str(error).partition("; wanted one of")[0]
+                raise DataError(f"{said}; wanted meshes of your own, or one of the sets above") from None
+            if cfg.use == "train":
                 raise
             print(f"No data set ({error}), so each mesh is checked as one to match.\n")
             return check_files(paths)
@@ -88,7 +94,7 @@ def _list(sets: Sequence[FolderSet]) -> dict[str, Any]:
 
 
 def _conclude(report: Report, folder: Path) -> dict[str, Any]:
-    print(report)
+    print("\n".join([str(report), *_left_out(folder)]))
     if report.n_unusable:
         raise DataError(
             f"{folder}: {report.n_unusable} of {counted(len(report.rows), 'shape')} cannot be used as a set with known "
@@ -114,17 +120,31 @@ def _has_truth(shapes: FolderSet, name: str) -> bool:
 
 
 def check_files(paths: Sequence[Path]) -> dict[str, Any]:
-    """Check meshes one by one, as `csm match` would take them; DataError if one cannot be used even after cleaning."""
-    files = [file for path in paths for file in (list_files(path, *READABLE) if path.is_dir() else [path])]
-    if not files:
-        raise DataError(f"{paths[0]}: there are no meshes in this folder; csm reads {', '.join(READABLE)}")
-    rows = [_of_file(file) for file in files]
-    print("\n".join(_table(rows)))
-    bad = [row for row in rows if row.problems]
-    print(f"\n{counted(len(rows), 'mesh')}, {len(rows) - len(bad)} can be matched")
-    if bad:
-        raise DataError(f"{len(bad)} of {counted(len(rows), 'mesh')} cannot be used, see the table")
+    """Check meshes one by one, as `csm match` would take them; DataError if one cannot be used even after cleaning.
+
+    A path without a mesh, and one that is not there, is a row of the table as well.
+    """
+    groups = [(path, listed_meshes(path).files if path.is_dir() else [path]) for path in paths]
+    empty = [path for path, files in groups if not files]
+    if len(paths) == len(empty) == 1:
+        raise DataError(f"{empty[0]}: {_NO_MESHES}")
+    rows = [_of_file(file) for _, files in groups for file in files]
+    without = [Inspected(str(path), problems=(f"{path}: {_NO_MESHES}",)) for path in empty]
+    print("\n".join(_table([*rows, *without])))
+    n_bad = sum(bool(row.problems) for row in rows)
+    print(f"\n{counted(len(rows), 'mesh')}, {len(rows) - n_bad} can be matched")
+    print("".join(f"{line}\n" for path in paths for line in _left_out(path)), end="")
+    said = [f"{n_bad} of {counted(len(rows), 'mesh')} cannot be used"] if n_bad else []
+    said += [f"{counted(len(empty), 'folder has', 'folders have')} no meshes"] if empty else []
+    if said:
+        raise DataError(f"{' and '.join(said)}, see the table")
     return {"shapes": len(rows), "missing": 0}
+
+
+def _left_out(folder: Path) -> list[str]:
+    """Say which meshes of a folder are not taken for shapes of it."""
+    left_out = listed_meshes(folder).left_out if folder.is_dir() else ""
+    return [f"{folder}: left out {left_out}"] if left_out else []
 
 
 def _of_file(file: Path) -> Inspected:
@@ -183,11 +203,16 @@ def _summary(report: Report) -> list[str]:
 
 
 def _known_sets() -> list[str]:
-    """Return where the sets that csm knows are published."""
-    lines = ["Sets that csm recognises, and where they are published:"]
+    """Return what csm reads, and where the sets that it knows are published: a name, and below it the place."""
+    lines = [
+        f"csm reads meshes of your own ({', '.join(READABLE)}),",
+        "and these sets, once you have fetched them:",
+        "",
+    ]
     for layout in layouts():
-        about = f"{layout.title}: {layout.origin}"
-        lines += textwrap.wrap(about, 110, initial_indent="  ", subsequent_indent="    ", break_on_hyphens=False)
+        if layout.key != "plain":
+            wrapped = textwrap.wrap(layout.origin, 104, break_on_hyphens=False, break_long_words=False)
+            lines += [f"  {layout.title}", *(f"      {line}" for line in wrapped)]
     return [*lines, ""]
 
 

@@ -13,14 +13,17 @@ from csm.data.registry import recognise
 from csm.data.splits import Split, as_split
 from csm.errors import DataError
 from csm.mesh.io import list_files
-
-_GEOMETRY, _ARRAYS = (".off", ".ply", ".obj", ".stl", ".vtk", ".glb", ".gltf"), (".npz", ".mat")
+from csm.mesh.io.listing import ARRAYS, GEOMETRY, written_meshes
 
 
 def _plain(layout: Layout, folder: Path) -> FolderSet | None:
-    """Find meshes in the folder or in its `off`, with `corres/NAME.vts`, or else one connectivity for all."""
-    places = [(folder, _GEOMETRY), (folder / "off", _GEOMETRY), (folder, _ARRAYS)]
-    meshes = next((files for place, suffixes in places if (files := list_files(place, *suffixes))), [])
+    """Find meshes in the folder or in its `off`, with `corres/NAME.vts`, or else one connectivity for all.
+
+    What a match has written into the folder is no shape of it.
+    """
+    places, written = [(folder, GEOMETRY), (folder / "off", GEOMETRY), (folder, ARRAYS)], written_meshes(folder)
+    found = ([path for path in list_files(place, *suffixes) if path.name not in written] for place, suffixes in places)
+    meshes = next((files for files in found if files), [])
     if not meshes:
         return None
     by_name, maps = stems(meshes), stems(list_files(folder / "corres", ".vts"))

@@ -69,7 +69,7 @@ def recognise(folder: str | Path) -> FolderSet:
     below = [str(s.root) for s in find_sets(root, depth=2)]
     if below:
         raise DataError(f"{root}: this is no set itself; did you mean {', '.join(below[:10])}?")
-    known = ", ".join(layout.title for layout in layouts())
+    known = "; ".join(layout.title for layout in layouts())
     plain = [str(path) for path in list_folders(root, 2) if _first(path, layouts())]
     where = f"; there are some in {', '.join(plain[:10])}" if plain else ""
     raise DataError(f"{root}: there are no meshes that csm can read{where}; wanted one of: {known}")

@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import numpy as np
@@ -5,8 +6,11 @@ import pytest
 from omegaconf import OmegaConf
 
 from csm.commands.check import check_folder, run
+from csm.data.registry import layouts as known_layouts
+from csm.data.registry import recognise
 from csm.errors import DataError
-from csm.mesh.io import write_mesh
+from csm.matching.collection.shapes import mesh_files
+from csm.mesh.io import file_digest, write_mesh
 from csm.mesh.shape import Mesh
 from tests.data import layouts
 from tests.shapes import sphere
@@ -67,8 +71,50 @@ def test_files_are_checked_as_meshes_to_match(capsys):
 def test_an_empty_folder_is_answered_with_where_sets_are_published(tmp_path, capsys):
     out, error = checked(capsys, tmp_path)
     assert "no meshes that csm can read" in error
-    assert "MPI-FAUST: MPI-FAUST.zip" in out
+    assert "  MPI-FAUST\n      MPI-FAUST.zip" in out
     assert "https://" in out
+
+
+def test_the_sets_that_are_published_stand_one_below_the_other_with_their_places(tmp_path, capsys):
+    out, _ = checked(capsys, tmp_path, use="train")
+    lines = out.splitlines()
+    for layout in known_layouts()[:-1]:
+        at = lines.index(f"  {layout.title}")
+        assert layout.origin.startswith(lines[at + 1].strip())
+        assert lines[at + 1].startswith("      ")
+    assert "  plain folder" not in lines
+
+
+def test_every_argument_gets_its_answer(tmp_path, capsys):
+    (tmp_path / "empty").mkdir()
+    write_mesh(tmp_path / "full" / "a.off", sphere(1))
+    write_mesh(tmp_path / "full" / "b.off", sphere(2))
+    out, error = checked(capsys, tmp_path / "gone.off", tmp_path / "empty", tmp_path / "full")
+    assert "gone.off: there is no such file" in out
+    assert "empty: there are no meshes in this folder" in out
+    assert "3 meshes, 2 can be matched" in out
+    assert error == "1 of 3 meshes cannot be used and 1 folder has no meshes, see the table"
+    assert "empty: there are no meshes in this folder" in checked(capsys, tmp_path / "empty", use="match")[1]
+    out, error = checked(capsys, tmp_path / "empty", tmp_path / "full" / "a.off")
+    assert error == "1 folder has no meshes, see the table"
+
+
+def test_what_a_match_has_written_is_left_out_as_the_match_of_the_folder_does(tmp_path, capsys):
+    for n in (1, 2):
+        write_mesh(tmp_path / f"{n}.off", sphere(2))
+    write_mesh(tmp_path / "reference.ply", sphere(1))
+    digest = file_digest(tmp_path / "reference.ply")
+    (tmp_path / "collection.json").write_text(json.dumps({"files": {"reference.ply": digest}}))
+    said = f"{tmp_path}: left out reference.ply, which csm match has written there"
+    out, error = checked(capsys, tmp_path)
+    assert error == ""
+    assert said in out
+    assert "2 shapes, 2 with correspondence" in out
+    np.savez(tmp_path / "d.npz", values=np.zeros(3))
+    out, _ = checked(capsys, tmp_path, use="match")
+    assert f"{said}, and d.npz, which may be no mesh" in out
+    assert "2 meshes, 2 can be matched" in out
+    assert len(mesh_files(tmp_path)) == len(recognise(tmp_path).names) == 2
 
 
 def test_a_folder_of_unlike_meshes_needs_no_correspondence_to_be_matched(tmp_path, capsys):

@@ -12,13 +12,11 @@ from csm._counts import counted
 from csm.errors import ConfigError, DataError
 from csm.matching.subjects import Subject
 from csm.mesh.inputs import HasFaces, MeshLike
-from csm.mesh.io import READABLE, list_files
-from csm.mesh.io.owned import COLLECTION, MATCH, files_of, is_as_left
+from csm.mesh.io import READABLE
+from csm.mesh.io.listing import listed_meshes
 from csm.mesh.polygons import PolygonMesh
 
 _log = logging.getLogger(__name__)
-
-_ARRAYS = (".npz", ".mat")  # of files, which may hold something else than a mesh
 
 Shapes: TypeAlias = str | os.PathLike[str] | Sequence[MeshLike]
 """A folder, or meshes in any form that `csm.match` takes."""
@@ -60,21 +58,16 @@ def mesh_files(folder: str | os.PathLike[str]) -> list[Path]:
     place = Path(folder).expanduser()
     if not place.is_dir():
         raise DataError(f"{folder}: there is no such folder; wanted one with two or more meshes")
-    plain = tuple(suffix for suffix in READABLE if suffix not in _ARRAYS)
-    known = {**files_of(place / MATCH), **files_of(place / COLLECTION)}
-    written = {name for name, digest in known.items() if "/" not in name and is_as_left(place / name, digest)}
-    found = [[p for p in list_files(place, *suffixes) if p.name not in written] for suffixes in (plain, _ARRAYS)]
-    files = found[0] or found[1]
-    left_out = sorted(name for name in written if Path(name).suffix in plain)
-    besides = f" besides {' and '.join(left_out)}, which csm match has written there" if left_out else ""
-    if len(files) < 2:
+    found = listed_meshes(place)
+    besides = f" besides {found.left_out}" if found.left_out else ""
+    if len(found.files) < 2:
         raise DataError(
-            f"{folder}: has {counted(len(files), 'mesh file')}{besides}, wanted two or more; csm reads "
+            f"{folder}: has {counted(len(found.files), 'mesh file')}{besides}, wanted two or more; csm reads "
             f"{', '.join(READABLE)}, and takes the files of the folder itself, not of folders in it"
         )
     if besides:
-        _log.warning("%s: %s shapes%s", folder, len(files), besides)
-    return files
+        _log.warning("%s: %s shapes%s", folder, len(found.files), besides)
+    return found.files
 
 
 def require_names(subjects: Sequence[Subject]) -> None:
