@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import logging
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Integral
@@ -52,14 +53,19 @@ class MeasuredPoints:
 
 
 def _name_pairs(pairs: Iterable[Sequence[str]]) -> tuple[Pair, ...]:
-    """Return pairs of names as tuples; ConfigError if something else is among them."""
+    """Return pairs of names as tuples, each once; ConfigError if something else is among them."""
     try:
         given = list(pairs)
         if any(isinstance(pair, str) for pair in given):
             raise TypeError("a name alone is no pair")
-        return tuple((source, target) for source, target in given)
+        found = Counter((source, target) for source, target in given)
     except (TypeError, ValueError) as error:
         raise ConfigError(f'protocol: pairs={pairs!r}; wanted "all" or a list of name pairs ({error})') from error
+    twice = [pair for pair, times in found.items() if times > 1]
+    if twice:
+        more = f" and {len(twice) - 1} more are" if len(twice) > 1 else " is"
+        _log.warning("protocol: the pair %s -> %s%s named several times; each is measured once", *twice[0], more)
+    return tuple(found)
 
 
 @dataclass(frozen=True)

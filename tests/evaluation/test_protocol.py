@@ -156,6 +156,15 @@ def test_pairs_may_come_from_a_generator() -> None:
     assert protocol.choose(["a", "b"]) == protocol.choose(["a", "b"]) == [("a", "b"), ("b", "a")]
 
 
+def test_a_pair_that_is_named_twice_is_measured_once_and_said(caplog) -> None:
+    protocol = EvaluationProtocol(pairs=[("a", "b"), ("b", "a"), ("a", "b")])
+    assert protocol.choose(["a", "b"]) == [("a", "b"), ("b", "a")]
+    assert caplog.messages == ["protocol: the pair a -> b is named several times; each is measured once"]
+    caplog.clear()
+    EvaluationProtocol(pairs=protocol.pairs)
+    assert not caplog.messages
+
+
 def test_a_protocol_survives_pickling() -> None:
     protocol = EvaluationProtocol(pairs=[("a", "b")], points=3, exact_points=2)
     assert pickle.loads(pickle.dumps(protocol)) == protocol
