@@ -99,10 +99,11 @@ class PolygonMesh:
         """
         other = np.flatnonzero(self.sizes != 3)
         if other.size:
+            few = (self.sizes < 3).any()
             raise MeshError(
                 f"{self.label}: face {other[0]} has {counted(self.sizes[other[0]], 'corner')} ({other.size} of "
                 f"{len(self.sizes)} faces are no triangles), and csm computes on triangles; `csm clean` triangulates "
-                "them"
+                f"them{' and leaves out those of fewer than three corners' if few else ''}"
             )
         faces = self.corners.reshape(-1, 3)
         return Mesh(self.vertices, faces, self.name, source=self.source, notes=self.notes)

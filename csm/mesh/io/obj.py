@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 
+from csm._counts import counted
 from csm.errors import MeshError
 from csm.mesh.io.raw import RawMesh, coordinates, decode
 from csm.mesh.shape import Mesh
@@ -38,12 +39,25 @@ def parse_obj(data: bytes) -> RawMesh:
         last = words or last
     if not vertices:
         raise MeshError("there is no line 'v x y z', so this is no OBJ mesh")
-    if last and last[0] == "f" and len(last) < 4:
+    edges = _edges(data, sizes)
+    if last and last[0] == "f" and len(last) < 4 and not (len(last) == 3 and data.endswith((b"\n", b"\r"))):
         raise MeshError(f"the file ends in the middle of face {len(sizes) - 1} ({' '.join(last)!r}): it was cut short")
+    if edges and max(sizes) < 3:
+        raise MeshError(f"{edges[0]}; these are edges, and csm works on surfaces: save the mesh with its faces")
     points = coordinates(vertices)
     numbers = np.array(corners, dtype=np.int64)
     _require_existing(numbers, np.array(sizes, dtype=np.int64), len(points))
-    return RawMesh(points, numbers, np.array(sizes, dtype=np.int64), _notes(numbers, len(points)))
+    return RawMesh(points, numbers, np.array(sizes, dtype=np.int64), (*_notes(numbers, len(points)), *edges))
+
+
+def _edges(data: bytes, sizes: list[int]) -> tuple[str, ...]:
+    """Return a note on faces of fewer than three corners with the line of the first; none if there are none."""
+    short = [face for face, size in enumerate(sizes) if size < 3]
+    if not short:
+        return ()
+    lines = [i for i, line in enumerate(decode(data).splitlines(), 1) if line.split()[:1] == ["f"]]
+    more = f" (the first of {len(short)} such faces)" if len(short) > 1 else ""
+    return (f"line {lines[short[0]]} has a face of {counted(sizes[short[0]], 'corner')}{more}, wanted three or more",)
 
 
 def _corners(words: list[str], face: int, n_so_far: int) -> list[int]:

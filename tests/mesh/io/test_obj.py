@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from csm.errors import MeshError
-from csm.mesh.io import read_mesh
+from csm.mesh.io import read_mesh, read_polygons
 from csm.mesh.io.obj import format_obj, parse_obj
 from tests.shapes import blob
 
@@ -65,6 +65,19 @@ def test_polygons_are_kept_with_their_corners():
     raw = parse_obj((POINTS + "f 1 2 3\nf 1/1 2/1 3/1 4/1\nf 1 2\nf -1 -2 -3\n").encode())
     assert raw.sizes.tolist() == [3, 4, 2, 3]
     assert raw.corners.tolist() == [0, 1, 2, 0, 1, 2, 3, 0, 1, 3, 2, 1]
+
+
+def test_faces_of_two_corners_are_named_with_their_line(tmp_path):
+    raw = parse_obj(("# edges\n" + POINTS + "f 1 2 3\nf 1 2\nf 2 3 \\\n4\nf 3 4\n").encode())
+    assert raw.sizes.tolist() == [3, 2, 3, 2]
+    line = POINTS.count("\n") + 3
+    assert raw.notes == (f"line {line} has a face of 2 corners (the first of 2 such faces), wanted three or more",)
+    with pytest.raises(MeshError, match=r"line 5 has a face of 2 corners.*these are edges"):
+        parse_obj(b"v 0 0 0\nv 1 0 0\nv 1 1 0\n\nf 1 2\nf 2 3\n")
+    (tmp_path / "a.obj").write_text(POINTS + "f 1 2 3\nf 1 2\nf 2 3 4\n")
+    with pytest.raises(MeshError, match="leaves out those of fewer than three corners"):
+        read_mesh(tmp_path / "a.obj")
+    assert len(read_polygons(tmp_path / "a.obj").triangulated().mesh.faces) == 2
 
 
 def test_vertices_of_no_face_are_a_note_since_a_cut_file_has_them():
