@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from csm._types import BoolArray, IntArray
+from csm._types import BoolArray, FloatArray, IntArray
 from csm.errors import MeshError
 from csm.mesh.debris import DEBRIS, body_of
 from csm.mesh.inputs import MeshLike, as_mesh
@@ -30,6 +30,9 @@ be beyond 1e9."""
 
 SIZES = (1e-4, 1e4)
 """Square roots of the surface area between which a scale is unremarkable (metres, centimetres and millimetres fit)."""
+
+SMALLEST = 1e-70
+"""Width of a mesh below which squares of areas may be below the smallest numbers that there are."""
 
 _N_FIRST = 5
 
@@ -83,6 +86,14 @@ def flat_faces(mesh: Mesh) -> BoolArray:
     longest = (np.roll(mesh.corners, -1, axis=1) - mesh.corners) ** 2
     flat: BoolArray = mesh.face_areas <= FLAT * longest.sum(axis=2).max(axis=1)
     return flat
+
+
+def too_small(places: FloatArray) -> str:
+    """Return a phrase where corners, shape (n, 3), are so close together that areas underflow; else nothing."""
+    size = float(np.ptp(places, axis=0).max()) if len(places) else 0.0
+    if not 0 < size < SMALLEST:
+        return ""
+    return f"the mesh is only {size:.3g} wide, and areas of its faces are too small for numbers; scale it up"
 
 
 def require_usable(mesh: Mesh) -> None:
@@ -168,7 +179,9 @@ def _degenerate(t: _Topology) -> Iterator[Finding]:
         return
     flat = flat_faces(mesh)
     if flat.all():
-        yield Finding("zero_total_area", mesh.n_faces, (), "error", "no face has an area, so there is no surface")
+        small = too_small(mesh.vertices[t.referenced])
+        why = f": {small}" if small else ", so there is no surface"
+        yield Finding("zero_total_area", mesh.n_faces, (), "error", f"no face has an area{why}")
     elif flat.any():
         yield _found("zero_area_faces", "note", "faces of zero area", np.flatnonzero(flat))
         alive = np.zeros(mesh.n_vertices, dtype=bool)

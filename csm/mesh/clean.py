@@ -18,7 +18,7 @@ import numpy as np
 from csm._counts import counted
 from csm._types import BoolArray, FloatArray, IntArray
 from csm.errors import ConfigError, MeshError
-from csm.mesh.check import flat_faces
+from csm.mesh.check import flat_faces, too_small
 from csm.mesh.debris import DEBRIS, body_of
 from csm.mesh.inputs import MeshLike, as_polygons
 from csm.mesh.mending import collapsed, joined_short_edges, sound_faces, split, turns, welded
@@ -228,7 +228,9 @@ class _Work:
         if flat.all():
             n = len(mesh.faces) if isinstance(mesh, Mesh) else len(mesh.sizes)
             every = "its only face vanishes" if n == 1 else f"all of its {n} faces vanish"
-            raise MeshError(f"{mesh.label}: {every}: corners coincide or lie on a line; no surface is left")
+            small = too_small(mesh.vertices[np.unique(mesh.faces if isinstance(mesh, Mesh) else mesh.corners)])
+            why = small or "corners coincide or lie on a line; no surface is left"
+            raise MeshError(f"{mesh.label}: {every}: {why}")
         return flat
 
     def collapse(self, mesh: Mesh | PolygonMesh) -> None:

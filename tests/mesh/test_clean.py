@@ -143,6 +143,18 @@ def test_a_mesh_of_which_no_surface_is_left_is_refused_with_the_reason(faces, sa
         clean(Mesh(line, np.array(faces)))
 
 
+def test_a_mesh_whose_areas_underflow_is_called_too_small():
+    ball = blob(2)
+    tiny = Mesh(1e-200 * ball.vertices, ball.faces)
+    with pytest.raises(MeshError, match=r"all of its 320 faces vanish: the mesh is only .*e-200 wide.*scale it up"):
+        clean(tiny)
+    (found,) = [finding for finding in check(tiny) if finding.severity == "error"]
+    assert "e-200 wide" in found.text
+    with pytest.raises(MeshError, match="too small"):
+        clean(Mesh(1e-90 * ball.vertices, ball.faces))
+    assert clean(Mesh(1e-60 * ball.vertices, ball.faces)).mends == ()
+
+
 def test_labels_carry_over():
     mesh = torus()
     loose = soup(mesh)
