@@ -39,6 +39,18 @@ SETTINGS = {
 }
 """Commands -> settings of groups with several options that are changed most, each with an example, and what they do."""
 
+_SHARED = ("store", "device", "workers")
+
+IDLE = {
+    "bodies": ("store", "device"),
+    "check": _SHARED,
+    "clean": _SHARED,
+    "describe": _SHARED,
+    "doctor": ("device", "workers"),
+    "sweep-report": _SHARED,
+}
+"""Commands -> the shared options that change nothing in them; they are taken, so that scripts can give them to all."""
+
 
 @dataclass
 class Page:
@@ -50,9 +62,10 @@ class Page:
 
 
 def read_page(config_name: str) -> Page:
-    """Read the yaml of a command, and those that it builds on."""
+    """Read the yaml of a command, and those that it builds on, without the options that change nothing in it."""
     page = Page()
     _read(config_name, page)
+    page.options = [option for option in page.options if option[0] not in IDLE.get(config_name, ())]
     return page
 
 

@@ -2,13 +2,15 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from omegaconf import OmegaConf
 
+import csm.commands
 from csm.commands.choices import config_folder
 from csm.commands.groups import data_configs
-from csm.commands.help import SETTINGS, help_text, read_page
+from csm.commands.help import IDLE, SETTINGS, help_text, read_page
 from csm.commands.main import COMMANDS
 from csm.reproduction.registry import STUDIES, explained
 
@@ -21,6 +23,15 @@ def test_every_option_of_every_command_is_explained(command):
     assert unexplained == []
     text = help_text(command)
     assert all(f"  {key}=" in text for key, *_ in page.options)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_shared_options_are_shown_where_they_do_something(command):
+    shown = {key for key, *_ in read_page(command).options}
+    assert "debug" in shown
+    assert {"store", "device", "workers"} - shown == set(IDLE.get(command, ()))
+    source = (Path(csm.commands.__file__).parent / f"{command.replace('-', '_')}.py").read_text()
+    assert not any(f"cfg.{key}" in source for key in IDLE.get(command, ()))
 
 
 def test_groups_are_listed_with_their_options_and_single_ones_as_settings():
