@@ -25,3 +25,24 @@ class NumericalError(CsmError):
 
 class ConfigError(CsmError):
     """An option has a value that cannot work."""
+
+
+class ParameterError(ConfigError):
+    """A parameter of an object has a value that cannot work.
+
+    Parameters
+    ----------
+    owner
+        What the object is called.
+    name, value
+        The parameter, and what came.
+    wanted
+        In words.
+    """
+
+    def __init__(self, owner: str, name: str, value: object, wanted: str) -> None:
+        super().__init__(owner, name, value, wanted)  # all of them, so that it can be pickled
+        self.owner, self.name, self.value, self.wanted = owner, name, value, wanted
+
+    def __str__(self) -> str:
+        return f"{self.owner}: {self.name}={self.value!r}; wanted {self.wanted}"

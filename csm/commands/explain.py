@@ -22,7 +22,7 @@ from omegaconf.errors import (
 from csm._extras import install_line
 from csm.commands.choices import config_folder, options_of
 from csm.commands.words import nearest_names
-from csm.errors import CsmError
+from csm.errors import CsmError, ParameterError
 from csm.experiments._moved import MOVED
 
 _EXTRAS = {
@@ -35,6 +35,8 @@ _EXTRAS = {
     "anny": "prep",
 }
 """What is missing -> the extra of csm that brings it."""
+
+_FULL_KEY = re.compile(r"full_key: ([\w.]+)")
 
 _ADVICE = {
     errno.ENOSPC: "the disk is full; free some space, or choose another folder",
@@ -62,6 +64,8 @@ def explained(error: BaseException, config_name: str) -> str | None:
         The yaml of the command, whose keys are offered where one is misspelt.
     """
     for one in _chain(error):
+        if isinstance(one, ParameterError):
+            return _of_parameter(one, error)
         if isinstance(one, CsmError):
             return str(one)
     for one in _chain(error):
@@ -124,9 +128,19 @@ def _extra(name: str, wanted: str = "") -> str:
     return f"{wanted or name} needs an extra that is not installed: {install_line(_EXTRAS[name])}"
 
 
+def _of_parameter(error: ParameterError, outer: BaseException) -> str:
+    """Say what is wrong with a parameter by the key that it is typed as, where its object was made from the options."""
+    made = (str(one) for one in _chain(outer) if isinstance(one, InstantiationException))
+    key = next((found[1] for found in map(_FULL_KEY.search, made) if found), None)
+    if key is None:
+        return str(error)
+    value = "null" if error.value is None else list(error.value) if isinstance(error.value, tuple) else error.value
+    return f"{key}.{error.name}={value}: wanted {error.wanted}"
+
+
 def _not_made(error: InstantiationException) -> str | None:
     text = str(error.__cause__ or error)
-    key = re.search(r"full_key: ([\w.]+)", str(error))
+    key = _FULL_KEY.search(str(error))
     where = f"{key[1]}: " if key else ""
     unknown = re.search(r"unexpected keyword argument '(\w+)'", str(error))
     if unknown:
@@ -141,7 +155,7 @@ def _not_made(error: InstantiationException) -> str | None:
 def _of_hydra(error: BaseException, config_name: str) -> str:
     text = str(error)
     if isinstance(error, MissingMandatoryValue):
-        key = re.search(r"full_key: ([\w.]+)", text) or re.search(r"Missing mandatory value: ([\w.]+)", text)
+        key = _FULL_KEY.search(text) or re.search(r"Missing mandatory value: ([\w.]+)", text)
         name = key[1] if key else "an option"
         return f"{name} has to be given: {name}=VALUE"
     if isinstance(error, InterpolationKeyError | InterpolationResolutionError):

@@ -15,7 +15,6 @@ from csm._types import FloatArray, IntArray
 from csm.descriptors.angular import ByAngle
 from csm.descriptors.base import Features, as_operators
 from csm.descriptors.stack import Stack
-from csm.errors import ConfigError
 from csm.mesh.debris import component_areas
 from csm.mesh.inputs import MeshLike
 from csm.operators.frames import FrameKind
@@ -101,12 +100,9 @@ class ACD(ByAngle):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.angles < 1 or self.order < 0 or not self.alpha >= 0:
-            raise ConfigError(f"{self}: wanted alpha >= 0, angles >= 1 and order >= 0")
-        if not self.damping >= 0:
-            raise ConfigError(f"{self}: wanted damping >= 0")
-        if self.cuts < 1 or self.k - self.cuts < 1:
-            raise ConfigError(f"{self}: wanted cuts >= 1 and k > cuts, so that the last cut still has 2 eigenpairs")
+        self._require_from(0, "alpha", "order", "damping")
+        self._require_from(1, "angles", "cuts")
+        self._require(self.k > self.cuts, "k", f"more than cuts={self.cuts}, so that the last cut has 2 eigenpairs")
         self._require_different_angles()
 
     @classmethod

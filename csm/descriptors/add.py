@@ -12,7 +12,6 @@ from csm.descriptors.acd import unit_rows
 from csm.descriptors.angular import ByAngle
 from csm.descriptors.base import Features
 from csm.descriptors.geovec import geometry_vectors
-from csm.errors import ConfigError
 from csm.operators.frames import FrameKind
 from csm.operators.operators import Operators
 from csm.operators.spectrum import Spectrum
@@ -84,8 +83,9 @@ class ADD(ByAngle):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.angles < 1 or self.k < 2 or self.n_splines < 2 or not self.alpha >= 0:
-            raise ConfigError(f"{self}: wanted alpha >= 0, angles >= 1, k >= 2 and n_splines >= 2")
+        self._require_from(0, "alpha")
+        self._require_from(1, "angles")
+        self._require_from(2, "k", "n_splines")
         self._require_different_angles()
 
     @property

@@ -69,8 +69,9 @@ class AMKS(Descriptor):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.k < 2 or self.n_energies < 2 or not self.variance > 0 or not self.time >= 0:
-            raise ConfigError(f"{self}: wanted k and n_energies of at least 2, variance > 0 and time >= 0")
+        self._require_from(0, "time")
+        self._require_from(2, "k", "n_energies")
+        self._require(self.variance > 0, "variance", "a number above 0")
 
     def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, (N, n_energies), in units of 1/area^2 of the chosen unit of length."""

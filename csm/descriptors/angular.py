@@ -10,7 +10,6 @@ from csm._parallel import thread_map
 from csm._progress import progress_bar
 from csm._types import FloatArray
 from csm.descriptors.base import Descriptor
-from csm.errors import ConfigError
 from csm.operators.frames import FrameKind
 from csm.operators.operators import Operators
 from csm.operators.spectrum import Spectrum
@@ -34,8 +33,8 @@ class ByAngle(Descriptor):
         return np.arange(self.angles, dtype=np.float64) * (np.pi / self.angles)
 
     def _require_different_angles(self) -> None:
-        if self.alpha == 0 and self.angles != 1:
-            raise ConfigError(f"{self}: at alpha=0 all {self.angles} blocks would be equal; set angles=1")
+        alike = self.alpha == 0 and self.angles != 1
+        self._require(not alike, "angles", "1 at alpha=0, where all blocks would be equal; set angles=1")
 
     def _spectra(self, operators: Operators, k: int | None = None) -> list[Spectrum]:
         """Return the `k` smallest eigenpairs for each angle, by several threads, with a bar for big meshes."""

@@ -11,7 +11,6 @@ from csm._types import FloatArray
 from csm.descriptors.acd import unit_rows
 from csm.descriptors.angular import ByAngle
 from csm.descriptors.base import Features
-from csm.errors import ConfigError
 from csm.operators.filters import filter_names, meyer_filters, unit_sums
 from csm.operators.frames import FrameKind
 from csm.operators.operators import Operators
@@ -76,8 +75,9 @@ class ASMWD(ByAngle):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.angles < 1 or self.k < 2 or self.n_filters < 2 or not self.alpha >= 0:
-            raise ConfigError(f"{self}: wanted alpha >= 0, angles >= 1, k >= 2 and n_filters >= 2")
+        self._require_from(0, "alpha")
+        self._require_from(1, "angles")
+        self._require_from(2, "k", "n_filters")
         self._require_different_angles()
 
     @property

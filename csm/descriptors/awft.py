@@ -9,7 +9,6 @@ import numpy as np
 
 from csm.descriptors.base import Descriptor, Features
 from csm.descriptors.windowed import ColumnNorm, require_known, surface_functions, unit_columns, windowed_energies
-from csm.errors import ConfigError
 from csm.operators.frames import FrameKind
 from csm.operators.operators import Operators
 from csm.operators.spectrum import Spectrum
@@ -95,10 +94,10 @@ class AWFT(Descriptor):
         for field in ("alphas", "degrees", "taus", "functions"):  # lists, as json and configuration files have them
             object.__setattr__(self, field, tuple(getattr(self, field)))
         require_known(self.functions)
-        if self.k < 2 or self.index_sweeps < 0 or not self.degrees:
-            raise ConfigError(f"{self}: wanted k >= 2, index_sweeps >= 0 and at least one angle")
-        if not (self.alphas and self.taus and min(self.alphas) > 0 and min(self.taus) > 0):
-            raise ConfigError(f"{self}: wanted positive alphas and taus")
+        self._require_from(0, "index_sweeps")
+        self._require_from(2, "k")
+        self._require(bool(self.degrees), "degrees", "one angle or more")
+        self._require_positive("alphas", "taus")
 
     @property
     def columns(self) -> tuple[str, ...]:

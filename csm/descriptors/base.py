@@ -18,7 +18,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from csm._counts import counted
 from csm._types import FloatArray, IntArray
-from csm.errors import ConfigError
+from csm.errors import ConfigError, ParameterError
 from csm.mesh.inputs import MeshLike, as_mesh
 from csm.operators.operators import Operators
 
@@ -127,12 +127,27 @@ class Descriptor(ABC):
             if kind not in _WANTED or (value is None and rest == "None"):
                 continue
             if not _is_kind(value, kind):
-                raise ConfigError(f"{self.name}: {field.name}={value!r}; wanted {_WANTED[kind]}")
+                raise ParameterError(self.name, field.name, value, _WANTED[kind])
             if kind in ("int", "float") and not isinstance(value, int | float):
                 object.__setattr__(self, field.name, int(value) if kind == "int" else float(value))
         for name, words in _choices(type(self)).items():
-            if getattr(self, name) not in words:
-                raise ConfigError(f"{self.name}: {name}={getattr(self, name)!r}; wanted one of {', '.join(words)}")
+            self._require(getattr(self, name) in words, name, f"one of {', '.join(words)}")
+
+    def _require(self, good: bool, name: str, wanted: str) -> None:
+        """Raise a `csm.errors.ParameterError` about a parameter unless its value is good."""
+        if not good:
+            raise ParameterError(self.name, name, getattr(self, name), wanted)
+
+    def _require_from(self, least: int, *names: str) -> None:
+        """Raise one unless these numbers are at least so great."""
+        for name in names:
+            self._require(getattr(self, name) >= least, name, f"{least} or more")
+
+    def _require_positive(self, *names: str) -> None:
+        """Raise one unless each of these lists has numbers, all of them above 0."""
+        for name in names:
+            values = getattr(self, name)
+            self._require(bool(values) and min(values) > 0, name, "one number or more, all above 0")
 
     @property
     def eigenpairs(self) -> int:

@@ -11,7 +11,6 @@ import numpy as np
 
 from csm._types import Float32Array, FloatArray
 from csm.descriptors.base import Descriptor, Features
-from csm.errors import ConfigError
 from csm.operators.geodesic import geodesics
 from csm.operators.operators import Operators
 
@@ -82,10 +81,14 @@ class DEP(Descriptor):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.n_scales < 1 or self.k < 2 or not 0 < self.smallest <= self.largest <= 1:
-            raise ConfigError(f"{self}: wanted n_scales >= 1, k >= 2 and 0 < smallest <= largest <= 1")
-        if not (0 < self.c < 1 and 0 < self.tolerance < 1):
-            raise ConfigError(f"{self}: wanted c and tolerance between 0 and 1, both left out")
+        self._require_from(1, "n_scales")
+        self._require_from(2, "k")
+        self._require(0 < self.largest <= 1, "largest", "a number above 0, up to 1")
+        self._require(
+            0 < self.smallest <= self.largest, "smallest", f"a number above 0, up to largest={self.largest:g}"
+        )
+        for name in ("c", "tolerance"):
+            self._require(0 < getattr(self, name) < 1, name, "a number between 0 and 1, both left out")
 
     @property
     def scales(self) -> FloatArray:

@@ -10,7 +10,6 @@ import numpy as np
 from csm.descriptors.acd import unit_rows
 from csm.descriptors.base import Descriptor, Features
 from csm.descriptors.geovec import geometry_vectors
-from csm.errors import ConfigError
 from csm.operators.operators import Operators
 
 
@@ -71,8 +70,8 @@ class GeometryVectors(Descriptor):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.k < 2 or self.n_splines < 2 or not self.reach > 0:
-            raise ConfigError(f"{self}: wanted k >= 2, n_splines >= 2 and reach > 0")
+        self._require_from(2, "k", "n_splines")
+        self._require(self.reach > 0, "reach", "a number above 0")
 
     @property
     def columns(self) -> tuple[str, ...]:

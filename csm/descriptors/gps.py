@@ -8,7 +8,6 @@ from typing import ClassVar
 import numpy as np
 
 from csm.descriptors.base import Descriptor, Features
-from csm.errors import ConfigError
 from csm.operators.operators import Operators
 
 
@@ -50,8 +49,7 @@ class GPS(Descriptor):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.k < 1:
-            raise ConfigError(f"{self}: wanted k of at least 1")
+        self._require_from(1, "k")
 
     @property
     def eigenpairs(self) -> int:

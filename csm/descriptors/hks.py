@@ -10,7 +10,7 @@ import numpy as np
 
 from csm._types import FloatArray
 from csm.descriptors.base import Descriptor, Features
-from csm.errors import ConfigError
+from csm.errors import ParameterError
 from csm.operators.operators import Operators
 
 
@@ -56,10 +56,11 @@ class HKS(Descriptor):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.k < 2 or self.n_times < 2:
-            raise ConfigError(f"{self}: wanted k and n_times of at least 2")
+        self._require_from(2, "k", "n_times")
         if self._fixed is None and (self.first, self.last) != (None, None):
-            raise ConfigError(f"first={self.first}, last={self.last}: wanted two times with 0 < first < last, or none")
+            name, other = ("last", "first") if self.first is None else ("first", "last")
+            wanted = f"two times with 0 < first < last, or none of both; {other}={getattr(self, other)}"
+            raise ParameterError(self.name, name, getattr(self, name), wanted)
 
     @property
     def _fixed(self) -> tuple[float, float] | None:

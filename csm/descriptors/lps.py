@@ -12,7 +12,6 @@ from scipy.sparse.csgraph import dijkstra
 from csm._parallel import thread_map
 from csm._types import BoolArray, FloatArray, IntArray
 from csm.descriptors.base import Descriptor, Features
-from csm.errors import ConfigError
 from csm.mesh.shape import Mesh
 from csm.mesh.topology import edge_graph
 from csm.operators.geodesic import geodesics
@@ -83,8 +82,8 @@ class LPS(Descriptor):
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "radii", tuple(self.radii))  # a list, where they come from a record
-        if not self.radii or not min(self.radii) > 0 or self.k < 1:
-            raise ConfigError(f"{self}: wanted some radii, all positive, and k of at least 1")
+        self._require_from(1, "k")
+        self._require_positive("radii")
 
     @property
     def eigenpairs(self) -> int:

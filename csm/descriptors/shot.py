@@ -13,7 +13,6 @@ from scipy.spatial import cKDTree
 from csm._types import FloatArray, IntArray
 from csm.descriptors.acd import unit_rows
 from csm.descriptors.base import Descriptor, Features
-from csm.errors import ConfigError
 from csm.operators.operators import Operators
 
 SECTORS = 8
@@ -82,8 +81,8 @@ class SHOT(Descriptor):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.radius > 0 or self.bins < 1 or self.min_neighbours < 1:
-            raise ConfigError(f"{self}: wanted radius > 0, bins >= 1 and min_neighbours >= 1")
+        self._require_from(1, "bins", "min_neighbours")
+        self._require(self.radius > 0, "radius", "a number above 0")
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -8,7 +8,6 @@ from typing import ClassVar, Literal, TypeAlias
 from csm.descriptors.acd import unit_rows
 from csm.descriptors.asmwd import meyer_block
 from csm.descriptors.base import Descriptor, Features
-from csm.errors import ConfigError
 from csm.operators.filters import filter_names, mexican_hat_filters
 from csm.operators.operators import Operators
 
@@ -61,8 +60,7 @@ class SMWD(Descriptor):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.k < 2 or self.n_filters < 2:
-            raise ConfigError(f"{self}: wanted k and n_filters of at least 2")
+        self._require_from(2, "k", "n_filters")
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -9,7 +9,6 @@ import numpy as np
 
 from csm._types import Float32Array, FloatArray, IntArray
 from csm.descriptors.base import Descriptor, Features
-from csm.errors import ConfigError
 from csm.operators.filters import filter_names, mexican_hat_filters
 from csm.operators.operators import Operators
 
@@ -71,8 +70,10 @@ class WEDS(Descriptor):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.k < 2 or self.levels < 1 or self.n_filters < self.levels + 2:
-            raise ConfigError(f"{self}: wanted k >= 2, levels >= 1 and n_filters >= levels + 2")
+        self._require_from(1, "levels")
+        self._require_from(2, "k")
+        least = self.levels + 2
+        self._require(self.n_filters >= least, "n_filters", f"{least} or more, which is 2 more than levels")
 
     @property
     def eigenpairs(self) -> int:

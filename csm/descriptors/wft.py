@@ -7,7 +7,6 @@ from typing import ClassVar
 
 from csm.descriptors.base import Descriptor, Features
 from csm.descriptors.windowed import ColumnNorm, require_known, surface_functions, unit_columns, windowed_energies
-from csm.errors import ConfigError
 from csm.operators.operators import Operators
 
 
@@ -84,8 +83,9 @@ class WFT(Descriptor):
         for field in ("taus", "functions"):  # lists, as json and configuration files have them
             object.__setattr__(self, field, tuple(getattr(self, field)))
         require_known(self.functions)
-        if self.k < 2 or not self.taus or not min(self.taus) > 0 or self.index_sweeps < 0:
-            raise ConfigError(f"{self}: wanted k >= 2, positive taus and index_sweeps >= 0")
+        self._require_from(0, "index_sweeps")
+        self._require_from(2, "k")
+        self._require_positive("taus")
 
     @property
     def columns(self) -> tuple[str, ...]:

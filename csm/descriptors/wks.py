@@ -55,8 +55,8 @@ class WKS(Descriptor):
     def __post_init__(self) -> None:
         super().__post_init__()
         least = 29 if self.variant == "functional_map" else 2
-        if self.k < 2 or self.n_energies < least:
-            raise ConfigError(f"{self}: wanted k of at least 2 and n_energies of at least {least}")
+        self._require_from(2, "k")
+        self._require_from(least, "n_energies")
 
     def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, (N, n_energies), in units of 1/area."""

@@ -7,6 +7,8 @@ from importlib.util import find_spec
 import pytest
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
+from hydra.errors import InstantiationException
+from hydra.utils import instantiate
 
 from csm.commands.choices import config_folder
 from csm.commands.explain import explained, known_keys
@@ -100,3 +102,24 @@ def test_keys_of_a_command_are_listed_with_dots():
 
 def test_a_config_error_is_itself():
     assert explained(ConfigError("seed=-1"), "train") == "seed=-1"
+
+
+@pytest.mark.parametrize(
+    ("overrides", "said"),
+    [
+        (["descriptor.damping=-1"], "descriptor.damping=-1: wanted 0 or more"),
+        (["descriptor.k=4"], "descriptor.k=4: wanted more than cuts=4, so that the last cut has 2 eigenpairs"),
+        (["descriptor=awft", "descriptor.taus=[0]"], "descriptor.taus=[0]: wanted one number or more, all above 0"),
+        (["descriptor=acd_two_bands", "descriptor.parts.low.order=-2"], "descriptor.parts.low.order=-2: wanted 0 or"),
+        (["descriptor=hks", "descriptor.last=3"], "descriptor.last=3: wanted two times with 0 < first < last"),
+    ],
+)
+def test_a_parameter_out_of_range_is_named_as_it_was_typed(overrides, said):
+    GlobalHydra.instance().clear()
+    with initialize_config_dir(str(config_folder()), version_base="1.3"):
+        cfg = compose("describe", overrides)
+    with pytest.raises(InstantiationException) as caught:
+        instantiate(cfg.descriptor)
+    text = explained(caught.value, "describe")
+    assert text.startswith(said)
+    assert "ACD(" not in text

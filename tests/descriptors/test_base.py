@@ -174,9 +174,13 @@ def test_a_family_states_its_fields_and_gets_the_rest():
         ("lps", {"radii": ["a"]}, "lps: radii=['a']; wanted a list of finite numbers"),
         ("acd_two_bands", {"parts": {"a": 3}}, "stack: parts={'a': 3}; wanted descriptors by name"),
         ("acd", {"normalise": "yes"}, "acd: normalise='yes'; wanted true or false"),
+        ("acd", {"angles": 0}, "acd: angles=0; wanted 1 or more"),
+        ("wks", {"variant": "functional_map", "n_energies": 28}, "wks: n_energies=28; wanted 29 or more"),
+        ("dep", {"smallest": 0.5, "largest": 0.4}, "dep: smallest=0.5; wanted a number above 0, up to largest=0.4"),
+        ("hks", {"first": 3.0}, "hks: first=3.0; wanted two times with 0 < first < last, or none of both; last=None"),
     ],
 )
-def test_a_parameter_of_another_type_is_refused_with_what_was_wanted(name, wrong, wanted):
+def test_a_wrong_parameter_is_refused_with_what_was_wanted(name, wrong, wanted):
     with pytest.raises(ConfigError, match=re.escape(wanted)):
         preset(name, **wrong)
 
