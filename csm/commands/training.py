@@ -18,6 +18,7 @@ from csm.commands.groups import make_data, make_protocol, matching_of, plain
 from csm.commands.outputs import require_results
 from csm.commands.processes import is_first, processes_to_start, train_together
 from csm.commands.tested import conclude
+from csm.data.base import DataModule
 from csm.data.inspection import require_sound
 from csm.errors import ConfigError
 from csm.experiments.callbacks import ValidationErrors
@@ -51,9 +52,7 @@ def train(cfg: DictConfig) -> dict[str, Any] | None:
     if is_first() or cfg.trainer.get("strategy") != NAME:
         tests = counted(len(training.data.split.test), "test shape")
         begins = f"; begins with the weights of {training.pretrained}" if training.pretrained else ""
-        print(f"{training.name}: {training.data.protocol}; {tests}{begins}", flush=True)
-        if ends_before_validation(cfg):
-            print(f"no validation: trainer.check_val_every_n_epoch={cfg.trainer.check_val_every_n_epoch}", flush=True)
+        print(f"{training.name}: {trained_how(cfg, training.data)}; {tests}{begins}", flush=True)
     trained = fit(training, folder, cfg.resume)
     if HydraConfig.get().mode == RunMode.RUN:  # the jobs of a sweep that torchrun started go on together
         part()
@@ -66,7 +65,7 @@ def train(cfg: DictConfig) -> dict[str, Any] | None:
         return with_objective(found, cfg.objective)
     method = NetworkMethod(trained.module)
     tested = measure_all(method, training.data, protocol, matching=matching, table=cfg.table, device=cfg.device)
-    conclude(cfg, tested, f"{training.name}: {method.training.get('protocol')}.", [training_section(trained)])
+    conclude(cfg, tested, f"{training.name}: {trained_how(cfg, training.data)}.", [training_section(trained)])
     if training.logger is not None:
         print(f"log:          {folder}  (tensorboard --logdir {folder})")
     return with_objective(found | numbers(tested), cfg.objective)
@@ -74,6 +73,17 @@ def train(cfg: DictConfig) -> dict[str, Any] | None:
 
 _NUMBERS = ("val/", "fit/", "train/", "step/", "age/", "exact/", "seconds", "parameters")
 _MEASURED = tuple(f"{group}/{name}" for group in (UNSEEN, FITTED) for name in ("age", "exact", "far", "flip"))
+
+
+def trained_how(cfg: DictConfig, data: DataModule) -> str:
+    """Return one sentence: what is fitted, and what is validated on if the training gets to its first validation."""
+    if not ends_before_validation(cfg):
+        return data.protocol
+    every, epochs = cfg.trainer.check_val_every_n_epoch, cfg.trainer.max_epochs
+    return (
+        f"{data.fitting}, not validated, as trainer.check_val_every_n_epoch={every} is more than "
+        f"trainer.max_epochs={epochs}"
+    )
 
 
 def ends_before_validation(cfg: DictConfig) -> bool:

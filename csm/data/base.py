@@ -110,9 +110,14 @@ class DataModule:
     @property
     def protocol(self) -> str:
         """One sentence for logs and results: what is fitted and what is validated on."""
+        return f"{self.fitting}, validated on {self.watched}"
+
+    @property
+    def fitting(self) -> str:
+        """What is fitted, in words."""
         sets = [(self.fit_names, self.train_set), *((more.names, more.shapes) for more in self.also)]
         fitted = " and ".join(f"{len(names)} shapes of {shapes.name}" for names, shapes in sets)
-        return f"split {self.split.label}; fitted on {fitted}, validated on {self.watched}"
+        return f"split {self.split.label}; fitted on {fitted}"
 
     def train_names(self) -> tuple[str, ...]:
         """Return the names of the shapes that are fitted or validated on; DataError if the set lacks one."""

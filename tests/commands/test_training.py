@@ -48,6 +48,19 @@ def test_a_short_training_ends_before_its_first_validation(every, epochs, never)
     assert ends_before_validation(OmegaConf.create({"trainer": trainer})) == never
 
 
+def test_one_thing_is_said_of_the_validation(tmp_path, monkeypatch, capsys):
+    bench = Bench(tmp_path, monkeypatch)
+    small = [*TOYS, "test=false", "data.holdout=2", "trainer.max_epochs=1", "logger=none"]
+    bench.run("train", *small, "trainer.check_val_every_n_epoch=2", "hydra.run.dir=none")
+    said = capsys.readouterr().out
+    assert "not validated, as trainer.check_val_every_n_epoch=2 is more than trainer.max_epochs=1; " in said
+    assert said.count("validat") == 1
+    bench.run("train", *small, "trainer.check_val_every_n_epoch=1", "hydra.run.dir=one")
+    said = capsys.readouterr().out
+    assert "validated on 2 held-out training shapes; " in said
+    assert "not validated" not in said
+
+
 def test_a_sweeper_is_told_the_number_that_it_makes_small(tmp_path, monkeypatch):
     bench = Bench(tmp_path, monkeypatch)
     short = ["trainer.max_epochs=4", "trainer.check_val_every_n_epoch=4", "data.holdout=2", "test=false"]
