@@ -37,6 +37,9 @@ Run = Callable[[DictConfig], dict[str, Any] | None]
 _NO_WORK = ("--cfg", "-c", "--info", "-i", "--hydra-help", "--version", "--shell-completion", "-sc")
 
 
+_AT_ONCE = ("check", "clean", "describe", "doctor", "sweep-report")  # commands of which a stop leaves nothing
+
+
 def output_folder() -> Path:
     """Return the folder of the running Hydra job."""
     return Path(HydraConfig.get().runtime.output_dir)
@@ -127,6 +130,8 @@ def _how_to_go_on(config_name: str) -> str:
     folder = next((text for text in sys.argv if text.startswith("hydra.run.dir=")), "")
     if config_name == "train" and folder:
         return f"what was finished is kept; the same command with {folder} goes on from there"
+    if config_name in _AT_ONCE and not _is_sweep(sys.argv):
+        return "the result is not written; the same command begins again"
     return "what was finished is kept; the same command goes on from there or begins again"
 
 

@@ -9,7 +9,8 @@ from typing import Any
 from omegaconf import DictConfig
 
 from csm._counts import counted
-from csm.commands.outputs import OVERWRITE, require_new_in_sweep, require_place
+from csm._signals import saying
+from csm.commands.outputs import BEGINS_AGAIN, OVERWRITE, require_new_in_sweep, require_place
 from csm.data.store import Store
 from csm.errors import ConfigError
 from csm.matching import Method
@@ -41,9 +42,10 @@ def run_collection(cfg: DictConfig, method: Method, text: str) -> dict[str, Any]
     outputs = [out / name for name in places([path.stem for path in files])]
     require_not_input([*outputs, out / ACCOUNT], files)
     require_own(outputs, out / ACCOUNT, cfg.overwrite, OVERWRITE)
-    found = match_collection(
-        files, method, clean=cfg.clean, store=Store(cfg.store), device=cfg.device, workers=cfg.workers
-    )
+    with saying(lambda: BEGINS_AGAIN):
+        found = match_collection(
+            files, method, clean=cfg.clean, store=Store(cfg.store), device=cfg.device, workers=cfg.workers
+        )
     seconds = time.perf_counter() - begun
     n_maps = write_collection(found, out, pairs=cfg.pairs, seconds=seconds, workers=cfg.workers)
     for mesh, subject in zip(found.meshes, found.subjects, strict=True):

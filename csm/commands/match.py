@@ -16,9 +16,10 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig
 
 from csm._counts import counted
+from csm._signals import saying
 from csm.commands.app import command
 from csm.commands.groups import plain, register
-from csm.commands.outputs import OVERWRITE, require_new_in_sweep, require_place
+from csm.commands.outputs import BEGINS_AGAIN, OVERWRITE, require_new_in_sweep, require_place
 from csm.data.store import Store
 from csm.descriptors.presets import preset_name
 from csm.errors import ConfigError
@@ -51,16 +52,17 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     folder = Path(cfg.out or f"{Path(cfg.source).stem}_to_{Path(cfg.target).stem}")
     _require_place(folder, [Path(cfg.source), Path(cfg.target)], cfg.overwrite)
     method, file = _method(cfg)
-    match = match_meshes(
-        cfg.source,
-        cfg.target,
-        method,
-        cfg.matching,
-        cfg.refine,
-        clean=cfg.clean,
-        store=Store(cfg.store),
-        device=cfg.device,
-    )
+    with saying(lambda: BEGINS_AGAIN):
+        match = match_meshes(
+            cfg.source,
+            cfg.target,
+            method,
+            cfg.matching,
+            cfg.refine,
+            clean=cfg.clean,
+            store=Store(cfg.store),
+            device=cfg.device,
+        )
     text = _called(match.method, file)
     write_match(match, folder, text, time.perf_counter() - begun)
     for note in match.notes:

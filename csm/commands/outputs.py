@@ -19,6 +19,9 @@ from csm.errors import ConfigError
 OVERWRITE = "give another out=, or overwrite=true to replace it"
 """What can be done about a file that csm does not replace by itself."""
 
+BEGINS_AGAIN = "the result is not written; the same command begins again, with the descriptors and eigenpairs that are in the store"
+"""What is true of a stopped command that writes all of its result at its end, and keeps what it knows of shapes."""
+
 
 def require_place(path: Path, what: str = "out") -> None:
     """Raise before the work if a folder cannot be made, or written into, at `path`; nothing is left there.

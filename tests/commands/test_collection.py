@@ -67,3 +67,33 @@ def test_the_help_tells_of_folders(csm):
     _, out, _ = csm("match", "--help")
     assert "folder=null" in out
     assert "pairs=auto" in out
+
+
+@pytest.mark.parametrize("words", [["folder=in", "descriptor=gps"], ["in/s0.off", "in/s1.off", "descriptor=gps"]])
+def test_a_stopped_match_says_that_nothing_is_written(csm, tmp_path, monkeypatch, words):
+    (tmp_path / "in").mkdir()
+    for mesh in copies(2):
+        write_mesh(tmp_path / "in" / f"{mesh.name}.off", mesh)
+
+    def stop(*args, **options):
+        raise KeyboardInterrupt
+
+    for place in ("csm.commands.match.match_meshes", "csm.commands.collection.match_collection"):
+        monkeypatch.setattr(place, stop)
+    status, _, error = csm("match", *words, "out=r")
+    assert status == 130
+    assert error.startswith("csm: stopped: the result is not written; the same command begins again")
+    assert not (tmp_path / "r").exists()
+
+
+@pytest.mark.parametrize("words", [["describe", "a.off", "d.npz"], ["clean", "a.off", "b.off"]])
+def test_a_stopped_command_without_a_store_says_that_it_begins_again(csm, tmp_path, monkeypatch, words):
+    write_mesh(tmp_path / "a.off", blob(2))
+
+    def stop(*args, **options):
+        raise KeyboardInterrupt
+
+    for place in ("csm.commands.describe.subject_of", "csm.commands.clean.clean"):
+        monkeypatch.setattr(place, stop)
+    status, _, error = csm(*words)
+    assert (status, error) == (130, "csm: stopped: the result is not written; the same command begins again\n")
