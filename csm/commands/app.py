@@ -25,6 +25,7 @@ from csm._signals import exit_status, terminable
 from csm.commands.choices import config_folder
 from csm.commands.explain import explained
 from csm.commands.help import help_text
+from csm.commands.outputs import require_own_places
 from csm.commands.processes import end_with_parent, is_first, typed_command
 from csm.commands.schema import require_valid
 from csm.commands.words import asks_for_help, to_overrides
@@ -87,6 +88,7 @@ def command(config_name: str, *, folder: bool = False, kept: Sequence[str] = ())
             remember_command(typed or sys.argv)
             with _errors_told(config_name, "debug=true" in arguments):
                 sys.argv[1:] = to_overrides(config_name, arguments)
+                require_own_places(config_name, sys.argv[1:])
                 with terminable():
                     return _raising(failures, main, config_name, folder or _is_sweep(sys.argv))
 

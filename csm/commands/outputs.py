@@ -5,12 +5,14 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from hydra.core.hydra_config import HydraConfig
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.errors import HydraException
 from hydra.types import RunMode
 from numpy.typing import NDArray
 
@@ -19,7 +21,7 @@ from csm.errors import ConfigError
 OVERWRITE = "give another out=, or overwrite=true to replace it"
 """What can be done about a file that csm does not replace by itself."""
 
-BEGINS_AGAIN = "the result is not written; the same command begins again, with the descriptors and eigenpairs that are in the store"
+BEGINS_AGAIN = "the result is not written; the same command begins again (the store has what is known of the shapes)"
 """What is true of a stopped command that writes all of its result at its end, and keeps what it knows of shapes."""
 
 
@@ -111,10 +113,48 @@ def checksum(values: NDArray[Any]) -> str:
     return hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()
 
 
+_NAMED_BY = {
+    "match": ("out", "source", "target", "folder"),
+    "describe": ("out",),
+    "clean": ("out",),
+    "bodies": ("out",),
+}
+"""Commands that write to one place -> the keys that it depends on."""
+
+_EACH_ITS_OWN = "the jobs of a sweep would replace each other's results; give each its own: out='NAME_${hydra:job.num}'"
+
+
+def require_own_places(command: str, overrides: Sequence[str]) -> None:
+    """Raise before the first job of a sweep if all of its jobs would write to the same place.
+
+    Parameters
+    ----------
+    command
+        Such as "match".
+    overrides
+        As Hydra takes them, flags among them.
+
+    Raises
+    ------
+    ConfigError
+        If so.
+    """
+    if command not in _NAMED_BY or not {"-m", "--multirun"} & set(overrides):
+        return
+    try:
+        given = OverridesParser.create().parse_overrides([text for text in overrides if not text.startswith("-")])
+    except HydraException:
+        return  # Hydra itself says what is wrong with them
+    swept = {one.get_key_element() for one in given if one.is_sweep_override()}
+    out = next((one for one in reversed(given) if one.get_key_element() == "out"), None)
+    value = None if out is None or out.is_sweep_override() else str(out.value())
+    keys = _NAMED_BY[command] if value in (None, "None") else ("out",)
+    if swept and not swept & set(keys) and "${" not in str(value):
+        shown = "out" if value in (None, "None") else f"out={value}"
+        raise ConfigError(f"{shown}: is the same for all jobs, and {_EACH_ITS_OWN}")
+
+
 def require_new_in_sweep(out: Path) -> None:
     """Raise if a job of a sweep would write where another one has: an output that all jobs have in common."""
     if HydraConfig.initialized() and HydraConfig.get().mode == RunMode.MULTIRUN and os.path.lexists(out):
-        raise ConfigError(
-            f"out={out}: is there already, and the jobs of a sweep would replace each other's results; give each its "
-            "own: out='NAME_${hydra:job.num}'"
-        )
+        raise ConfigError(f"out={out}: is there already, and {_EACH_ITS_OWN}")

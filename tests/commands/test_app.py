@@ -244,7 +244,9 @@ def test_jobs_of_a_sweep_do_not_replace_each_others_match(csm, tmp_path):
     words = ["match", "-m", "a.off", "a.off", "descriptor=gps,constant"]
     status, _, error = csm(*words, "out=r", "hydra.sweep.dir=s")
     assert status == 2
+    assert "out=r: is the same for all jobs" in error
     assert "out='NAME_${hydra:job.num}'" in error
+    assert visible(tmp_path) == {"a.off"}
     assert csm(*words, "out='r_${hydra:job.num}'", "hydra.sweep.dir=t")[0] == 0
     assert {"r_0", "r_1"} <= visible(tmp_path)
     assert len((tmp_path / "t/sweep.csv").read_text().splitlines()) == 3

@@ -10,6 +10,7 @@ from csm.commands.outputs import (
     checksum,
     require_file_place,
     require_own_archive,
+    require_own_places,
     require_place,
     require_results,
 )
@@ -78,3 +79,28 @@ def test_results_are_added_to_results_only(tmp_path):
     (tmp_path / "other.json").write_text('{"a": 1}')
     with pytest.raises(DataError, match=r"other\.json"):
         require_results(str(tmp_path / "other.json"))
+
+
+@pytest.mark.parametrize(
+    ("command", "overrides", "shared"),
+    [
+        ("match", ["-m", "source='a.off'", "target='b.off'", "out='r'", "refine=none,joint"], "out=r: is the same"),
+        ("match", ["-m", "source='a.off'", "target='b.off'", "refine=none,joint"], "out: is the same for all jobs"),
+        ("match", ["-m", "folder='in'", "out=null", "refine=none,joint"], "out: is the same for all jobs"),
+        ("match", ["-m", "source='a.off','c.off'", "target='b.off'", "out='r'"], "out=r: is the same"),
+        ("describe", ["--multirun", "mesh='a.off','b.off'", "out='d.npz'"], "out=d.npz: is the same"),
+        ("match", ["-m", "source='a.off','c.off'", "target='b.off'"], None),
+        ("match", ["-m", "source='a.off'", "target='b.off'", "out='r'"], None),
+        ("match", ["source='a.off'", "target='b.off'", "out='r'"], None),
+        ("match", ["-m", "source='a.off'", "out='r_${hydra:job.num}'", "refine=none,joint"], None),
+        ("clean", ["-m", "in='a.off'", "out='b.off','c.off'", "weld=true,false"], None),
+        ("train", ["-m", "seed=0,1"], None),
+        ("match", ["-m", "out='r'", "refine=[none"], None),
+    ],
+)
+def test_a_place_that_all_jobs_of_a_sweep_share_is_named_before_the_first(command, overrides, shared):
+    if shared is None:
+        require_own_places(command, overrides)
+        return
+    with pytest.raises(ConfigError, match=rf"^{shared}.*NAME_\$\{{hydra:job\.num\}}"):
+        require_own_places(command, overrides)
