@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from csm import _progress
-from csm._progress import progress_bar
+from csm._progress import Lines, progress_bar
 
 
 class Stream(io.StringIO):
@@ -49,6 +49,17 @@ def test_a_log_gets_whole_lines_a_minute_apart(monkeypatch, clock):
     assert 2 <= len(lines) <= 3
     assert all(line.startswith("work: ") and "shape" in line for line in lines)
     assert not {"\r", "\x1b"} & set(said)
+
+
+def test_the_first_lines_come_soon_and_the_others_a_minute_apart(clock):
+    stream, times = Stream(False), []
+    lines = Lines(stream, _progress.FIRST, _progress.SECONDS)
+    while clock[0] < 300:
+        clock[0] += 1
+        before = stream.tell()
+        lines.write(f"work: {clock[0]:.0f} s")
+        times += [clock[0]] * (stream.tell() > before)
+    assert times == [15, 45, 105, 165, 225, 285]
 
 
 def test_a_log_of_a_short_run_stays_empty(monkeypatch, clock):

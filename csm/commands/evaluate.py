@@ -11,6 +11,7 @@ from typing import Any
 
 from omegaconf import DictConfig
 
+from csm._counts import counted
 from csm.commands.app import command
 from csm.commands.groups import make_data, make_protocol, matching_of, register
 from csm.commands.outputs import require_results
@@ -39,6 +40,10 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     require_classifier([method], matchers(matching))
     require_results(cfg.results)
     require_sound(data, exact=protocol.distance == "exact" and not protocol.fallback, train=False)
+    print(
+        f"{cfg.checkpoint}: testing on {counted(len(data.split.test), 'shape')} of {', '.join(data.test_sets)}",
+        flush=True,
+    )
     tested = measure_all(method, data, protocol, matching=matching, table=cfg.table, device=cfg.device)
     trained, split = method.training.get("protocol", "how it was trained is not known"), data.split.label
     if split not in trained:
