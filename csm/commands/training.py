@@ -25,7 +25,7 @@ from csm.experiments.callbacks import ValidationErrors
 from csm.experiments.ranks import NAME, part
 from csm.experiments.report import training_section
 from csm.experiments.resuming import AUTO, resume_point
-from csm.experiments.testing import measure_all, numbers
+from csm.experiments.testing import measure_all, numbers, require_same_test
 from csm.experiments.training import Training, fit
 from csm.learning.loading import FITTED, UNSEEN
 from csm.matching.base import require_device
@@ -44,6 +44,8 @@ def train(cfg: DictConfig) -> dict[str, Any] | None:
     require_device(cfg.device)
     require_results(cfg.results)
     _ = training.source  # read now, so that a wrong path is told at once
+    if cfg.test:
+        require_same_test(folder, training.data, protocol, matching)
     if cfg.resume not in (None, AUTO):
         resume_point(folder, cfg.resume)
     require_sound(training.data, test=cfg.test, exact=protocol.distance == "exact" and not protocol.fallback)

@@ -55,6 +55,8 @@ class ResultRow:
         The protocol in words.
     matching
         Name of the matcher.
+    split, weights
+        Whose test shapes were tested; hash of the network, of the first of several seeds.  Empty where it is not known.
 
     Raises
     ------
@@ -83,6 +85,8 @@ class ResultRow:
     flip_rate: float | None = None
     protocol: str = ""
     matching: str = "nearest"
+    split: str = ""
+    weights: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "seeds", tuple(self.seeds))
@@ -129,12 +133,10 @@ def result_row(
     if not evaluations or any(e.protocol != evaluations[0].protocol for e in evaluations):
         raise DataError(f"{method} on {test}: wanted one or more evaluations that follow one protocol")
 
-    def values(name: str) -> list[float]:
-        return [e.summary[name] for e in evaluations]
-
     def mean(name: str) -> float:
-        return float(np.mean(values(name)))
+        return float(np.mean([e.summary[name] for e in evaluations]))
 
+    ages = [e.summary["age"] for e in evaluations]
     protocol, n_pairs = evaluations[0].protocol, len(evaluations[0].rows)
     flip_rate = mean("flip_rate")
     return ResultRow(
@@ -143,7 +145,7 @@ def result_row(
         train=train,
         test=test,
         age=mean("age"),
-        age_std=float(np.std(values("age"), ddof=1)) if len(evaluations) > 1 else None,
+        age_std=float(np.std(ages, ddof=1)) if len(evaluations) > 1 else None,
         exact_match=mean("exact"),
         seeds=tuple(seeds),
         epochs=epochs,
@@ -184,7 +186,6 @@ def _average(rows: Sequence[ResultRow]) -> ResultRow:
             f"{first.method} on {first.test}: rows of {len(rows)} seeds differ in protocol or repeat a seed, so they "
             "have no mean"
         )
-    epochs = [row.epochs for row in rows if row.epochs is not None]
 
     def mean(name: str) -> float | None:
         values = [getattr(row, name) for row in rows]
@@ -196,7 +197,7 @@ def _average(rows: Sequence[ResultRow]) -> ResultRow:
         **averaged,
         age_std=float(np.std([row.age for row in rows], ddof=1)),
         seeds=seeds,
-        epochs=min(epochs, default=None),
+        epochs=min((row.epochs for row in rows if row.epochs is not None), default=None),
         seconds=round(sum(row.seconds for row in rows), 1),
         commit=" ".join(dict.fromkeys(row.commit for row in rows)),
     )
@@ -246,8 +247,7 @@ def add_rows(path: str | os.PathLike[str], rows: Sequence[ResultRow]) -> list[Re
 def write_table_csv(path: str | os.PathLike[str], rows: Sequence[ResultRow]) -> None:
     """Write rows as csv, one column per field; seeds joined by blanks, versions left to the json."""
     names = [f.name for f in fields(ResultRow) if f.name != "versions"]
-    lines = [[_cell(getattr(row, name)) for name in names] for row in rows]
-    _write_csv(path, names, lines)
+    _write_csv(path, names, [[_cell(getattr(row, name)) for name in names] for row in rows])
 
 
 def write_curves_csv(path: str | os.PathLike[str], curves: Mapping[str, Evaluation]) -> None:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from csm.data.base import DataModule
-from csm.data.shapes import ShapeSet
+from csm.data.shapes import ShapeSet, templates_of
 from csm.data.store import Store
+from csm.errors import ConfigError
 from csm.evaluation.engine import evaluate
 from csm.evaluation.protocol import EvaluationProtocol
 from csm.evaluation.provenance import provenance
-from csm.evaluation.report import ResultRow, result_row
+from csm.evaluation.report import ResultRow, read_rows, result_row
 from csm.evaluation.results import Evaluation
 from csm.matching.base import Matcher
 from csm.matching.methods import Method
@@ -86,7 +88,7 @@ def measure_set(
         device=device,
     )
     return [
-        Tested(_row(e, method, shapes, table), e, shapes, names, method, matcher(rule), data.store)
+        Tested(_row(e, method, shapes, table, data.split.label), e, shapes, names, method, matcher(rule), data.store)
         for e, rule in zip(found, matching, strict=True)
     ]
 
@@ -108,9 +110,9 @@ def measure_all(
     return [by_matcher[i] for i in range(len(matching)) for by_matcher in tested]
 
 
-def _row(evaluation: Evaluation, method: Method, shapes: ShapeSet, table: str) -> ResultRow:
+def _row(evaluation: Evaluation, method: Method, shapes: ShapeSet, table: str, split: str) -> ResultRow:
     training: Mapping[str, Any] = getattr(method, "training", {})
-    return result_row(
+    row = result_row(
         [evaluation],
         provenance(),
         table=table,
@@ -120,6 +122,53 @@ def _row(evaluation: Evaluation, method: Method, shapes: ShapeSet, table: str) -
         seeds=[training["seed"]] if "seed" in training else [],
         epochs=training.get("epochs"),
     )
+    return replace(row, split=split, weights=weights_of(method))
+
+
+def weights_of(method: Method) -> str:
+    """Return the hash of a network's weights; empty for a handcrafted descriptor."""
+    return str(getattr(method, "weights", ""))
+
+
+def require_same_test(
+    folder: Path, data: DataModule, protocol: EvaluationProtocol, matching: Sequence[str], weights: str | None = None
+) -> None:
+    """Raise before the work if a test in a folder would replace the rows of another one.
+
+    Rows of the same test sets, protocol and matchers are replaced, which is what a repeated test is for; so are those
+    to which the test adds others.
+
+    Parameters
+    ----------
+    folder
+        Where ``rows.json`` may be.
+    data, protocol, matching
+        What is to be tested, and how.
+    weights
+        Of the network, see `weights_of`; None where a training that goes on changes them.
+
+    Raises
+    ------
+    ConfigError
+        If a row is there that the test does not measure again.
+    DataError
+        If what is there holds no rows.
+    """
+    path = folder / "rows.json"
+    asked = {"matching": list(matching), "test set": list(data.test_sets), "split": [data.split.label], "protocol": []}
+    for shapes in data.test_sets.values() if path.exists() else ():
+        n_pairs = len(protocol.choose(data.test_names(shapes), templates_of(shapes)))
+        asked["protocol"].append(protocol.describe(n_pairs))
+    for row in read_rows(path) if path.exists() else ():
+        had = {"matching": row.matching, "test set": row.test, "split": row.split, "protocol": row.protocol}
+        other = [what for what in asked if had[what] and had[what] not in asked[what]]
+        if row.weights and weights not in (None, row.weights):
+            other = ["network"]
+        if other:
+            raise ConfigError(
+                f"{path}: has the errors of {row.method} on {row.test} ({row.matching}) by a test with another "
+                f"{other[0]}, which this one would replace; choose a new folder (hydra.run.dir=FOLDER)"
+            )
 
 
 def numbers(tested: Sequence[Tested]) -> dict[str, float]:

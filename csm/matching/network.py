@@ -21,6 +21,8 @@ from csm.matching.methods import Method
 from csm.matching.shipped import shipped_file, shipped_models
 from csm.mesh.shape import Mesh
 
+_CLASSIFIER = ("network.classifier.",)
+
 
 class NetworkMethod(Method):
     """A trained network, which brings the descriptor and the basis that it was trained with.
@@ -55,18 +57,25 @@ class NetworkMethod(Method):
     @cached_property
     def key(self) -> Mapping[str, Any]:
         """Network, input, the hash of the weights, and how they describe a shape."""
-        digest = hashlib.sha256()
-        for name, tensor in sorted(self.module.state_dict().items()):
-            if name.startswith("network.classifier.") and not self.module.has_classifier:
-                continue  # an export leaves it out, and what stands in its place is drawn at random
-            if name.startswith("others."):
-                continue  # the classifiers of further templates only served the training
-            digest.update(name.encode() + tensor.detach().cpu().numpy().tobytes())
         hparams = self.module.settings
         plain = {name: hparams[name] for name in ("network", "descriptor", "basis_k")}
         if self.module.places is not None:
             plain["places"] = {"version": PLACES_VERSION, "mirror": bool(self.module.mirror)}
-        return {**plain, "weights": digest.hexdigest()}
+        # an export leaves the classifier out, and what stands in its place is drawn at random
+        return {**plain, "weights": self._hash(() if self.module.has_classifier else _CLASSIFIER)}
+
+    @property
+    def weights(self) -> str:
+        """The hash of the weights that describe a shape, which a checkpoint and its export have in common."""
+        return self._hash(_CLASSIFIER)
+
+    def _hash(self, left_out: tuple[str, ...]) -> str:
+        """Return the hash of the weights but for those whose names begin so."""
+        digest = hashlib.sha256()
+        for name, tensor in sorted(self.module.state_dict().items()):
+            if not name.startswith((*left_out, "others.")):  # further templates' classifiers only served the training
+                digest.update(name.encode() + tensor.detach().cpu().numpy().tobytes())
+        return digest.hexdigest()
 
     @cached_property
     def recipe(self) -> Recipe:

@@ -61,6 +61,25 @@ def test_one_thing_is_said_of_the_validation(tmp_path, monkeypatch, capsys):
     assert "not validated" not in said
 
 
+@pytest.mark.parametrize("command", ["train", "evaluate"])
+def test_rows_of_another_test_are_not_replaced(tmp_path, monkeypatch, capsys, command):
+    bench = Bench(tmp_path, monkeypatch)
+    small = [*TOYS, "trainer.max_epochs=1", "trainer.check_val_every_n_epoch=1", "logger=none", "callbacks=none"]
+    words = {"train": small, "evaluate": ["checkpoint=run/model.ckpt", "data=folder", "data.root=toys"]}[command]
+    words = [command, *words, "data.n_test=2", "metric.distance=edge"]
+    if command == "evaluate":
+        bench.run("train", *small, "test=false", "hydra.run.dir=run")
+    bench.run(*words, "metric.points=20", "hydra.run.dir=here")
+    before = {path: path.read_bytes() for path in (tmp_path / "here").iterdir() if path.is_file()}
+    assert len(before) > 4
+    with pytest.raises(SystemExit) as stopped:
+        bench.run(*words, "metric.points=30", "hydra.run.dir=here")
+    assert stopped.value.code == 2
+    assert "on toys (nearest) by a test with another protocol, which this one would replace" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in before} == before
+    bench.run(*words, "metric.points=20", "hydra.run.dir=here")
+
+
 def test_a_sweeper_is_told_the_number_that_it_makes_small(tmp_path, monkeypatch):
     bench = Bench(tmp_path, monkeypatch)
     short = ["trainer.max_epochs=4", "trainer.check_val_every_n_epoch=4", "data.holdout=2", "test=false"]

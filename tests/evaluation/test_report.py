@@ -53,6 +53,14 @@ def test_rows_come_back_from_disk_as_they_were(tmp_path: Path) -> None:
     assert {*wanted.split(), "versions", "seconds"} <= set(entry)
 
 
+def test_rows_that_are_older_than_a_field_are_read(tmp_path: Path) -> None:
+    write_rows(tmp_path / "r.json", [row(split="mine (4 train, 2 test, 0)", weights="abc")])
+    (entry,) = json.loads((tmp_path / "r.json").read_text())
+    assert (entry.pop("split"), entry.pop("weights")) == ("mine (4 train, 2 test, 0)", "abc")
+    (tmp_path / "r.json").write_text(json.dumps([entry]))
+    assert read_rows(tmp_path / "r.json") == [row()]
+
+
 def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "r.json"
     write_rows(path, [row()])

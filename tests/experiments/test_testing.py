@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+from copy import copy
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -10,7 +13,8 @@ from csm.data.store import Store
 from csm.descriptors import HKS
 from csm.errors import ConfigError, DataError
 from csm.evaluation import EvaluationProtocol, evaluate, targets
-from csm.experiments.testing import measure_all, measure_set, numbers
+from csm.evaluation.report import write_rows
+from csm.experiments.testing import measure_all, measure_set, numbers, require_same_test
 from csm.learning.loading import LightningData
 from csm.matching import as_method
 from csm.matching.nearest import Nearest
@@ -49,6 +53,8 @@ def test_a_set_is_tested_on_the_test_shapes_of_the_split(data, network):
         assert (row.table, row.method, row.train, row.test) == ("mine", "net", "toys", "again")
         assert (row.matching, row.seeds, row.epochs, row.pairs) == (alone.matcher, (4,), 7, 6)
         assert row.age == alone.summary["age"]
+        assert row.split == data.split.label
+        assert row.weights == network.weights
         assert (one.names, one.shapes.name, one.method) == (names, "again", network)
 
 
@@ -64,6 +70,7 @@ def test_all_sets_are_tested_one_matcher_after_the_other(data, network):
 def test_a_descriptor_is_trained_on_nothing(data):
     (tested,) = measure_set(as_method(HKS(k=20, n_times=6)), data, data.train_set, PROTOCOL, matching=[Nearest()])
     assert (tested.row.method, tested.row.train, tested.row.seeds, tested.row.epochs) == ("hks", "none", (), None)
+    assert tested.row.weights == ""
 
 
 def test_finished_targets_are_kept(data, network, tmp_path, monkeypatch):
@@ -87,3 +94,30 @@ def test_what_cannot_be_tested_is_named(data, network, tmp_path):
         measure_set(network, data, data.train_set, PROTOCOL, matching=["vote"])
     with pytest.raises(ConfigError, match="different names"):
         measure_set(network, data, data.train_set, PROTOCOL, matching=["nearest", "nearest"])
+
+
+def test_rows_of_another_test_are_not_replaced(data, network, tmp_path):
+    require_same_test(tmp_path, data, PROTOCOL, ["nearest"], "any")
+    rows = [replace(t.row, weights="mine") for t in measure_all(network, data, PROTOCOL)]
+    write_rows(tmp_path / "rows.json", rows)
+    require_same_test(tmp_path, data, PROTOCOL, ["nearest", "argmax"], "mine")
+    require_same_test(tmp_path, data, PROTOCOL, ["nearest"])
+
+    fewer = copy(data)
+    fewer.test_sets = {"toys": data.test_sets["toys"]}
+    for other, protocol, matching, weights, said in (
+        (data, PROTOCOL, ["nearest"], "yours", "network"),
+        (data, PROTOCOL, ["argmax"], "mine", "matching"),
+        (data, replace(PROTOCOL, points=41), ["nearest"], "mine", "protocol"),
+        (data, replace(PROTOCOL, sample=3), ["nearest"], "mine", "protocol"),
+        (fewer, PROTOCOL, ["nearest"], "mine", "test set"),
+    ):
+        with pytest.raises(
+            ConfigError, match=rf"rows\.json: has the errors of net on .* with another {said}, .*choose a new"
+        ):
+            require_same_test(tmp_path, other, protocol, matching, weights)
+    write_rows(tmp_path / "rows.json", [replace(rows[0], split="other (1 train, 2 test, 0)")])
+    with pytest.raises(ConfigError, match="with another split"):
+        require_same_test(tmp_path, data, PROTOCOL, ["nearest"])
+    write_rows(tmp_path / "rows.json", [replace(rows[0], split="", weights="")])
+    require_same_test(tmp_path, data, PROTOCOL, ["nearest"], "mine")
