@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 
 def config_folder() -> Path:
@@ -78,3 +79,24 @@ def is_table(experiment: str) -> bool:
     """
     file = config_folder() / "experiment" / f"{experiment}.yaml"
     return file.is_file() and any(line.startswith("rows:") for line in file.read_text(encoding="utf-8").splitlines())
+
+
+def data_of(experiment: str) -> tuple[str | None, list[str]]:
+    """Return the data set that an experiment chooses, and which settings of that set it has; None if it chooses none.
+
+    Examples
+    --------
+    >>> data_of("demo"), data_of("faust"), data_of("of_my_own")
+    (('humans', ['test', 'split']), ('faust', []), (None, []))
+    """
+    from omegaconf import OmegaConf
+
+    file = config_folder() / "experiment" / f"{experiment}.yaml"
+    content: Any = OmegaConf.to_container(OmegaConf.load(file)) if file.is_file() else {}
+    defaults = [item for item in content.get("defaults", ()) if isinstance(item, dict)]
+    chosen = next((item["override /data"] for item in defaults if "override /data" in item), None)
+    return chosen, [key for key in content.get("data", ()) if key not in _OF_ALL_DATA]
+
+
+_OF_ALL_DATA = ("basis_k", "holdout", "also", "test_forms")
+"""Settings of data that mean the same whatever the set."""

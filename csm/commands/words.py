@@ -92,6 +92,7 @@ def to_overrides(command: str, arguments: Sequence[str]) -> list[str]:
             words.append(argument)
         else:
             overrides.append(_override(command, argument, sweeping))
+    _require_data_of_experiment(overrides)
     return [*flags, *_named(command, words), *filter(None, overrides), *options]
 
 
@@ -164,6 +165,22 @@ def _require_experiment_of(command: str, value: str) -> None:
                 f"experiment={name} is one training and no table: csm train experiment={name}; the tables are "
                 f"{', '.join(options_of('experiment', command))}"
             )
+
+
+def _require_data_of_experiment(overrides: Sequence[str]) -> None:
+    """Refuse other data than those of an experiment where it has settings for its own set that are left as they are."""
+    from csm.commands.choices import data_of
+
+    typed = {key.lstrip("+~"): value for key, _, value in (text.partition("=") for text in overrides)}
+    if not {"experiment", "data"} <= set(typed):
+        return
+    own, settings = data_of(typed["experiment"])
+    left = [f"data.{key}" for key in settings if f"data.{key}" not in typed]
+    if own not in (None, typed["data"]) and left:
+        raise ConfigError(
+            f"experiment={typed['experiment']} sets {' and '.join(left)} for data={own}, and data={typed['data']} is "
+            f"another set; add {' '.join(f'~{key}' for key in left)}, or give your own"
+        )
 
 
 def _assignments(value: str) -> list[str]:

@@ -107,6 +107,23 @@ def test_experiments_are_sent_to_the_command_that_runs_them(command, typed, said
     assert to_overrides(command, ["experiment=of_my_own"]) == ["experiment=of_my_own"]
 
 
+def test_settings_for_the_data_of_an_experiment_are_named_where_others_are_chosen():
+    words = ["experiment=demo", "data=folder", "data.root=."]
+    with pytest.raises(ConfigError) as refused:
+        to_overrides("train", words)
+    assert str(refused.value) == (
+        "experiment=demo sets data.test and data.split for data=humans, and data=folder is another set; "
+        "add ~data.test ~data.split, or give your own"
+    )
+    assert to_overrides("train", [*words, "~data.test", "data.split=null"])[-1] == "data.split=null"
+    for fine in (
+        ["experiment=demo", "data=humans"],
+        ["experiment=faust", "data=scape"],
+        ["experiment=tune", *words[1:]],
+    ):
+        to_overrides("train", fine)
+
+
 def test_only_near_names_are_offered():
     assert nearest_names("adc", ["acd", "hks"]) == "; did you mean acd?"
     assert nearest_names("zzz", ["acd", "hks"]) == ""
