@@ -100,9 +100,9 @@ class ACD(ByAngle):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._require_from(0, "alpha", "order", "damping")
-        self._require_from(1, "angles", "cuts")
-        self._require(self.k > self.cuts, "k", f"more than cuts={self.cuts}, so that the last cut has 2 eigenpairs")
+        self.require_at_least(0, "alpha", "order", "damping")
+        self.require_at_least(1, "angles", "cuts")
+        self.require(self.k > self.cuts, "k", f"more than cuts={self.cuts}, so that the last cut has 2 eigenpairs")
         self._require_different_angles()
 
     @classmethod

@@ -83,9 +83,9 @@ class ADD(ByAngle):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._require_from(0, "alpha")
-        self._require_from(1, "angles")
-        self._require_from(2, "k", "n_splines")
+        self.require_at_least(0, "alpha")
+        self.require_at_least(1, "angles")
+        self.require_at_least(2, "k", "n_splines")
         self._require_different_angles()
 
     @property

@@ -69,9 +69,9 @@ class AMKS(Descriptor):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._require_from(0, "time")
-        self._require_from(2, "k", "n_energies")
-        self._require(self.variance > 0, "variance", "a number above 0")
+        self.require_at_least(0, "time")
+        self.require_at_least(2, "k", "n_energies")
+        self.require(self.variance > 0, "variance", "a number above 0")
 
     def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, (N, n_energies), in units of 1/area^2 of the chosen unit of length."""

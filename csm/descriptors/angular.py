@@ -34,7 +34,7 @@ class ByAngle(Descriptor):
 
     def _require_different_angles(self) -> None:
         alike = self.alpha == 0 and self.angles != 1
-        self._require(not alike, "angles", "1 at alpha=0, where all blocks would be equal; set angles=1")
+        self.require(not alike, "angles", "1 at alpha=0, where all blocks would be equal; set angles=1")
 
     def _spectra(self, operators: Operators, k: int | None = None) -> list[Spectrum]:
         """Return the `k` smallest eigenpairs for each angle, by several threads, with a bar for big meshes."""

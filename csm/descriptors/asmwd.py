@@ -75,9 +75,9 @@ class ASMWD(ByAngle):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._require_from(0, "alpha")
-        self._require_from(1, "angles")
-        self._require_from(2, "k", "n_filters")
+        self.require_at_least(0, "alpha")
+        self.require_at_least(1, "angles")
+        self.require_at_least(2, "k", "n_filters")
         self._require_different_angles()
 
     @property

@@ -94,10 +94,10 @@ class AWFT(Descriptor):
         for field in ("alphas", "degrees", "taus", "functions"):  # lists, as json and configuration files have them
             object.__setattr__(self, field, tuple(getattr(self, field)))
         require_known(self.functions)
-        self._require_from(0, "index_sweeps")
-        self._require_from(2, "k")
-        self._require(bool(self.degrees), "degrees", "one angle or more")
-        self._require_positive("alphas", "taus")
+        self.require_at_least(0, "index_sweeps")
+        self.require_at_least(2, "k")
+        self.require(bool(self.degrees), "degrees", "one angle or more")
+        self.require_positive("alphas", "taus")
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -131,23 +131,23 @@ class Descriptor(ABC):
             if kind in ("int", "float") and not isinstance(value, int | float):
                 object.__setattr__(self, field.name, int(value) if kind == "int" else float(value))
         for name, words in _choices(type(self)).items():
-            self._require(getattr(self, name) in words, name, f"one of {', '.join(words)}")
+            self.require(getattr(self, name) in words, name, f"one of {', '.join(words)}")
 
-    def _require(self, good: bool, name: str, wanted: str) -> None:
+    def require(self, good: bool, name: str, wanted: str) -> None:
         """Raise a `csm.errors.ParameterError` about a parameter unless its value is good."""
         if not good:
             raise ParameterError(self.name, name, getattr(self, name), wanted)
 
-    def _require_from(self, least: int, *names: str) -> None:
+    def require_at_least(self, least: int, *names: str) -> None:
         """Raise one unless these numbers are at least so great."""
         for name in names:
-            self._require(getattr(self, name) >= least, name, f"{least} or more")
+            self.require(getattr(self, name) >= least, name, f"{least} or more")
 
-    def _require_positive(self, *names: str) -> None:
+    def require_positive(self, *names: str) -> None:
         """Raise one unless each of these lists has numbers, all of them above 0."""
         for name in names:
             values = getattr(self, name)
-            self._require(bool(values) and min(values) > 0, name, "one number or more, all above 0")
+            self.require(bool(values) and min(values) > 0, name, "one number or more, all above 0")
 
     @property
     def eigenpairs(self) -> int:

@@ -81,14 +81,12 @@ class DEP(Descriptor):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._require_from(1, "n_scales")
-        self._require_from(2, "k")
-        self._require(0 < self.largest <= 1, "largest", "a number above 0, up to 1")
-        self._require(
-            0 < self.smallest <= self.largest, "smallest", f"a number above 0, up to largest={self.largest:g}"
-        )
+        self.require_at_least(1, "n_scales")
+        self.require_at_least(2, "k")
+        self.require(0 < self.largest <= 1, "largest", "a number above 0, up to 1")
+        self.require(0 < self.smallest <= self.largest, "smallest", f"a number above 0, up to largest={self.largest:g}")
         for name in ("c", "tolerance"):
-            self._require(0 < getattr(self, name) < 1, name, "a number between 0 and 1, both left out")
+            self.require(0 < getattr(self, name) < 1, name, "a number between 0 and 1, both left out")
 
     @property
     def scales(self) -> FloatArray:

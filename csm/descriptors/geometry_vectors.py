@@ -70,8 +70,8 @@ class GeometryVectors(Descriptor):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._require_from(2, "k", "n_splines")
-        self._require(self.reach > 0, "reach", "a number above 0")
+        self.require_at_least(2, "k", "n_splines")
+        self.require(self.reach > 0, "reach", "a number above 0")
 
     @property
     def columns(self) -> tuple[str, ...]:

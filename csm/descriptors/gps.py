@@ -49,7 +49,7 @@ class GPS(Descriptor):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._require_from(1, "k")
+        self.require_at_least(1, "k")
 
     @property
     def eigenpairs(self) -> int:

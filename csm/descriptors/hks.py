@@ -56,7 +56,7 @@ class HKS(Descriptor):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._require_from(2, "k", "n_times")
+        self.require_at_least(2, "k", "n_times")
         if self._fixed is None and (self.first, self.last) != (None, None):
             name, other = ("last", "first") if self.first is None else ("first", "last")
             wanted = f"two times with 0 < first < last, or none of both; {other}={getattr(self, other)}"

@@ -82,8 +82,8 @@ class LPS(Descriptor):
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "radii", tuple(self.radii))  # a list, where they come from a record
-        self._require_from(1, "k")
-        self._require_positive("radii")
+        self.require_at_least(1, "k")
+        self.require_positive("radii")
 
     @property
     def eigenpairs(self) -> int:

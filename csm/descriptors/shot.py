@@ -81,8 +81,8 @@ class SHOT(Descriptor):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._require_from(1, "bins", "min_neighbours")
-        self._require(self.radius > 0, "radius", "a number above 0")
+        self.require_at_least(1, "bins", "min_neighbours")
+        self.require(self.radius > 0, "radius", "a number above 0")
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -60,7 +60,7 @@ class SMWD(Descriptor):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._require_from(2, "k", "n_filters")
+        self.require_at_least(2, "k", "n_filters")
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -70,10 +70,10 @@ class WEDS(Descriptor):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._require_from(1, "levels")
-        self._require_from(2, "k")
+        self.require_at_least(1, "levels")
+        self.require_at_least(2, "k")
         least = self.levels + 2
-        self._require(self.n_filters >= least, "n_filters", f"{least} or more, which is 2 more than levels")
+        self.require(self.n_filters >= least, "n_filters", f"{least} or more, which is 2 more than levels")
 
     @property
     def eigenpairs(self) -> int:

@@ -83,9 +83,9 @@ class WFT(Descriptor):
         for field in ("taus", "functions"):  # lists, as json and configuration files have them
             object.__setattr__(self, field, tuple(getattr(self, field)))
         require_known(self.functions)
-        self._require_from(0, "index_sweeps")
-        self._require_from(2, "k")
-        self._require_positive("taus")
+        self.require_at_least(0, "index_sweeps")
+        self.require_at_least(2, "k")
+        self.require_positive("taus")
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -55,8 +55,8 @@ class WKS(Descriptor):
     def __post_init__(self) -> None:
         super().__post_init__()
         least = 29 if self.variant == "functional_map" else 2
-        self._require_from(2, "k")
-        self._require_from(least, "n_energies")
+        self.require_at_least(2, "k")
+        self.require_at_least(least, "n_energies")
 
     def evaluate(self, operators: Operators) -> Features:
         """Return the descriptor of every vertex, (N, n_energies), in units of 1/area."""
