@@ -134,17 +134,27 @@ class Descriptor(ABC):
             self.require(getattr(self, name) in words, name, f"one of {', '.join(words)}")
 
     def require(self, good: bool, name: str, wanted: str) -> None:
-        """Raise a `csm.errors.ParameterError` about a parameter unless its value is good."""
+        """Raise a `csm.errors.ParameterError` about a parameter unless its value is good.
+
+        Parameters
+        ----------
+        good
+            Whether it is.
+        name
+            Of the parameter.
+        wanted
+            What is wanted of it, in words.
+        """
         if not good:
             raise ParameterError(self.name, name, getattr(self, name), wanted)
 
     def require_at_least(self, least: int, *names: str) -> None:
-        """Raise one unless these numbers are at least so great."""
+        """Raise a `csm.errors.ParameterError` about the first of these parameters that is below `least`."""
         for name in names:
             self.require(getattr(self, name) >= least, name, f"{least} or more")
 
     def require_positive(self, *names: str) -> None:
-        """Raise one unless each of these lists has numbers, all of them above 0."""
+        """Raise a `csm.errors.ParameterError` about the first of these lists that is empty or has a number up to 0."""
         for name in names:
             values = getattr(self, name)
             self.require(bool(values) and min(values) > 0, name, "one number or more, all above 0")
