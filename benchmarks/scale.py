@@ -1,6 +1,7 @@
 """Bases and ACD of big meshes: seconds and peak memory over the number of vertices, with the exponents of their growth.
 
     python benchmarks/scale.py --threads 2 --sizes 30000 100000
+    python benchmarks/scale.py --draw results/benchmark_scale.json picture.png
 
 The meshes are a built-in human, remeshed and then subdivided.  Each size runs in a process of its own, so that the peak
 is that of the whole process.  The work is what the paper's network needs of a shape: `acd_paper` and 128 functions of
@@ -20,11 +21,15 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import trimesh
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from measuring import options, write
 
 from csm import Mesh, Operators, load_humans, preset
 from csm._peak import peak_megabytes
 from csm.mesh.remesh import remesh
+from csm.viewer.figures import save_figure
+from csm.viewer.style import line_style, plain_axes
 
 SIZES = (30_000, 100_000, 300_000, 1_000_000)
 _COARSE = 16_000
@@ -82,6 +87,27 @@ def exponent(rows: list[Row], value: str) -> float:
     return float(np.polyfit(n, y, 1)[0])
 
 
+def draw(results: Path, picture: Path) -> None:
+    """Draw seconds and megabytes of a result over the number of vertices, with the powers that they grow with."""
+    rows = [Row(**row) for row in json.loads(results.read_text(encoding="utf-8"))["rows"]]
+    figure = Figure(figsize=(8.0, 3.2), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = {
+        "s": {"acd_paper": "acd_paper_s", "128 functions": "functions_s", "both": "seconds"},
+        "MB, peak of the process": {"both": "megabytes"},
+    }
+    for axes, (label, columns) in zip(figure.subplots(1, 2), panels.items(), strict=True):
+        for i, (name, column) in enumerate(columns.items()):
+            grown = f"{name}: power {exponent(rows, column):.2f}"
+            values = [getattr(row, column) for row in rows]
+            axes.loglog([row.vertices for row in rows], values, "o", label=grown, **line_style(i))
+        plain_axes(axes)
+        axes.set_xlabel("vertices")
+        axes.set_ylabel(label)
+        axes.legend(fontsize=8)
+    save_figure(picture, figure)
+
+
 def main() -> None:
     chosen = options("scale", __doc__, [], repeats=1, sizes=SIZES)
     rows = []
@@ -103,5 +129,7 @@ def main() -> None:
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--of"]:
         print(json.dumps(asdict(measured(Path(sys.argv[2])))))
+    elif sys.argv[1:2] == ["--draw"]:
+        draw(Path(sys.argv[2]), Path(sys.argv[3]))
     else:
         main()

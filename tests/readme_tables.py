@@ -2,7 +2,8 @@
 
 ``make tables`` rewrites every block between ``<!-- study: FILE -->`` (what ``csm reproduce`` found),
 ``<!-- benchmark: FILE -->`` (what a script of benchmarks/ measured), ``<!-- headline -->`` (a few numbers of Tables 1
-and 4) or ``<!-- layouts -->`` (where data sets are published) and ``<!-- end -->``; a test compares them.
+and 4), ``<!-- goals -->`` (of speed and memory) or ``<!-- layouts -->`` (where data sets are published) and ``<!-- end
+-->``; a test compares them.
 """
 
 from __future__ import annotations
@@ -14,9 +15,10 @@ from pathlib import Path
 
 from csm.data.registry import layouts
 from csm.reproduction.study import Findings
+from tests import goals
 
 ROOT = Path(__file__).resolve().parent.parent
-BLOCK = re.compile(r"(<!-- (?:(study|benchmark): (\S+)|headline|layouts) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+BLOCK = re.compile(r"(<!-- (?:(study|benchmark): (\S+)|headline|goals|layouts) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 MEASURED = {
     "work": ("", "{}"),
     "variant": ("", "{}"),
@@ -24,6 +26,7 @@ MEASURED = {
     "classes": ("template points", "{:,}"),
     "reference_ms": ("reference ms", "{:.0f}"),
     "csm_ms": ("csm ms", "{:.0f}"),
+    "queries": ("vertices", "{:,}"),
     "milliseconds": ("ms", "{:.0f}"),
     "acd_paper_s": ("ACD s", "{:.1f}"),
     "functions_s": ("128 functions s", "{:.1f}"),
@@ -35,6 +38,7 @@ MEASURED = {
     "descriptor": ("descriptor by", "{:.0e}"),
     "ratio": ("ratio", "{:.2f}"),
     "speedup": ("ratio", "{:.2f}"),
+    "of_products": ("of the products", "{:.2f}"),
     "goal": ("goal", "{:.4g}"),
     "pairs": ("pairs", "{}"),
     "error": ("error", "{:.1f}"),
@@ -129,10 +133,11 @@ def _written(key: str, value: object) -> str:
 def with_tables(text: str) -> str:
     """Return the text with every block made anew."""
     of_file = {"study": study, "benchmark": benchmark}
+    fixed = {"headline": headline, "layouts": published, "goals": lambda: goals.table(ROOT / "results")}
 
     def filled(found: re.Match[str]) -> str:
         begin, kind, path, _, end = found.groups()
-        made = of_file[kind](ROOT / path) if kind else published() if "layouts" in begin else headline()
+        made = of_file[kind](ROOT / path) if kind else fixed[begin.split()[1]]()
         return f"{begin}{made}{end}"
 
     return BLOCK.sub(filled, text)
