@@ -167,7 +167,8 @@ def require_same_test(
         if other:
             raise ConfigError(
                 f"{path}: has the errors of {row.method} on {row.test} ({row.matching}) by a test with another "
-                f"{other[0]}, which this one would replace; choose a new folder (hydra.run.dir=FOLDER)"
+                f"{other[0]}, which this one would replace; test into a new folder: csm evaluate checkpoint=MODEL "
+                "hydra.run.dir=FOLDER"
             )
 
 

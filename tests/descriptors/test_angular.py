@@ -28,6 +28,7 @@ def test_without_anisotropy_one_angle_is_enough_and_more_are_refused(family):
 
 
 def test_the_angles_of_a_big_mesh_have_a_bar(monkeypatch, capsys):
+    monkeypatch.setattr(_progress, "FIRST", 0.0)
     monkeypatch.setattr(_progress, "SECONDS", 0.0)
     family = ACD(angles=3, k=5, cuts=1)
     family(blob(2))
