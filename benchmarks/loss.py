@@ -74,7 +74,7 @@ def products_alone(kind: torch.dtype, given: Problem) -> None:
     """Compute the products of the scores, of the gradient of x and of that of the weight, part by part."""
     x, weight = (each.detach().to(kind) for each in given[:2])
     scores, found, whole = (
-        torch.empty(_PART, N, dtype=kind),
+        torch.empty(_PART, len(weight), dtype=kind),
         torch.empty(_PART, D, dtype=kind),
         torch.zeros_like(weight),
     )

@@ -185,12 +185,30 @@ def _flips(
     """Tell the left-right flips among the points measured exactly, where the miss is large enough for a flip."""
     mirrors = [np.full(len(m.truth), -1) if m.mirror is None else m.mirror for m in matches]
     far = [m.exact & (s > margin) & (mirror >= 0) for m, s, mirror in zip(matches, scaled, mirrors, strict=True)]
-    found = _between(surface, mirrors, [m.matched for m in matches], far)
-    flips: list[BoolArray | None] = []
-    for m, distance, where, from_mirror in zip(matches, scaled, far, found, strict=True):
-        flip = where & flipped(distance, ratios[m.group] * from_mirror, margin)
-        flips.append(None if m.mirror is None else flip[m.exact])
-    return flips
+    if isinstance(surface, StoredGeodesics):
+        found = _nearer(surface, mirrors, matches, far, [s - margin for s in scaled])
+    else:
+        distances = _between(surface, mirrors, [m.matched for m in matches], far)
+        found = [
+            where & flipped(s, ratios[m.group] * from_mirror, margin)
+            for m, s, where, from_mirror in zip(matches, scaled, far, distances, strict=True)
+        ]
+    return [None if m.mirror is None else flip[m.exact] for m, flip in zip(matches, found, strict=True)]
+
+
+def _nearer(
+    surface: StoredGeodesics,
+    mirrors: Sequence[IntArray],
+    matches: Sequence[MatchedPoints],
+    where: Sequence[BoolArray],
+    than: Sequence[FloatArray],
+) -> list[BoolArray]:
+    """Tell which matches are nearer to the mirrored truth than some distances, false elsewhere than at `where`."""
+    mask = np.concatenate(where)
+    starts, stops = np.concatenate(mirrors), np.concatenate([m.matched for m in matches])
+    found = np.zeros(len(mask), dtype=bool)
+    found[mask] = surface.nearer(starts[mask], stops[mask], np.concatenate(than)[mask])
+    return np.split(found, np.cumsum([len(w) for w in where])[:-1])
 
 
 def _joined(

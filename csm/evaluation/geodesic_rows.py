@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from csm._types import FloatArray, IntArray
+from csm._types import BoolArray, FloatArray, IntArray
 from csm.mesh.shape import Mesh
 from csm.operators.geodesic import Geodesics
 from csm.operators.operators import Memo
@@ -14,6 +14,8 @@ FAR = 0.2
 
 A propagation costs the area that it covers: for nearer pairs it is cheaper than to read a row.
 """
+
+_ROUNDING = 1e-5  # of a length, in units of sqrt(area): rows are kept in single precision
 
 
 class StoredGeodesics:
@@ -34,6 +36,7 @@ class StoredGeodesics:
 
     def __init__(self, surface: Geodesics, mesh: Mesh, memo: Memo) -> None:
         self._surface, self._mesh, self._memo = surface, mesh, memo
+        self._known: dict[int, FloatArray] = {}  # rows that were asked for, in single precision
 
     @property
     def method(self) -> str:
@@ -56,6 +59,29 @@ class StoredGeodesics:
             out[here] = self._row(int(source))[targets[here]]
         return out
 
+    def nearer(self, sources: IntArray, targets: IntArray, than: FloatArray) -> BoolArray:
+        """Tell whether ``sources[i]`` is nearer to ``targets[i]`` than ``than[i]``, shape (P,).
+
+        By the triangle inequality the rows that are known bound each distance from both sides, so that few pairs have
+        to be measured.
+        """
+        lower, upper = self._bounds(sources, targets)
+        slack = _ROUNDING * np.sqrt(self._mesh.area)
+        found: BoolArray = upper < than - slack
+        open_ = np.flatnonzero(~found & (lower < than + slack))
+        found[open_] = self.pairs(sources[open_], targets[open_]) < than[open_]
+        return found
+
+    def _bounds(self, sources: IntArray, targets: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return a least and a greatest distance of each pair, both of shape (P,)."""
+        lower, upper = np.zeros(len(sources)), np.full(len(sources), np.inf)
+        for row in self._known.values():
+            both = np.isfinite(row[sources]) & np.isfinite(row[targets])  # else the row is of another component
+            here, there = row[sources[both]].astype(np.float64), row[targets[both]].astype(np.float64)
+            lower[both] = np.maximum(lower[both], np.abs(here - there))
+            upper[both] = np.minimum(upper[both], here + there)
+        return lower, upper
+
     def diameter(self, max_rows: int = 8) -> float:
         """Estimate the largest distance from below; see `csm.operators.geodesic.Geodesics.diameter`."""
         params = {"method": self.method, "max_rows": max_rows}
@@ -71,4 +97,5 @@ class StoredGeodesics:
             {"method": self.method, "source": source},
             lambda: {"row": self._surface.rows(np.array([source]))[0].astype(np.float32)},
         )
+        self._known[source] = kept["row"]
         return kept["row"].astype(np.float64)

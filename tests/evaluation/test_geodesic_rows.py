@@ -17,6 +17,20 @@ def mesh() -> Mesh:
     return blob(2)
 
 
+class Counting:
+    """Distances that count the vertices that are propagated from."""
+
+    def __init__(self, surface) -> None:
+        self.surface, self.method, self.pairs_measured = surface, surface.method, 0
+
+    def rows(self, sources):
+        return self.surface.rows(sources)
+
+    def pairs(self, sources, targets):
+        self.pairs_measured += len(sources)
+        return self.surface.pairs(sources, targets)
+
+
 def pairs(mesh: Mesh, n: int = 40) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(0)
     return rng.integers(0, 9, n), rng.integers(0, mesh.n_vertices, n)
@@ -56,3 +70,28 @@ def test_what_no_path_joins_stays_infinitely_far(tmp_path):
     )
     kept = StoredGeodesics(geodesics(two), two, Store(tmp_path))
     assert kept.pairs(np.array([0]), np.array([one.n_vertices])) == np.inf
+
+
+def test_which_pairs_are_nearer_is_mostly_told_from_known_rows(tmp_path):
+    mesh, rng = blob(3), np.random.default_rng(0)
+    surface, asked = Counting(geodesics(mesh, "exact")), rng.integers(0, mesh.n_vertices, (2, 300))
+    kept = StoredGeodesics(surface, mesh, Store(tmp_path))
+    distances = geodesics(mesh, "exact").pairs(*asked)
+    than = distances + rng.choice([-1, 1], 300) * rng.uniform(0.01, 0.5, 300)
+    np.testing.assert_array_equal(kept.nearer(*asked, than), distances < than)  # nothing is known yet
+    measured = surface.pairs_measured
+    kept.rows(rng.integers(0, mesh.n_vertices, 60))
+    np.testing.assert_array_equal(kept.nearer(*asked, than), distances < than)
+    assert surface.pairs_measured - measured < 0.3 * measured
+
+
+def test_a_pair_on_two_components_is_never_nearer(tmp_path):
+    one = blob(1)
+    two = Mesh(
+        np.concatenate([one.vertices, one.vertices + 9]), np.concatenate([one.faces, one.faces + one.n_vertices])
+    )
+    kept = StoredGeodesics(geodesics(two), two, Store(tmp_path))
+    for _ in range(2):  # without and with known rows
+        there = np.array([0, one.n_vertices])
+        assert kept.nearer(np.array([1, 1]), there, np.array([99.0, 99.0])).tolist() == [True, False]
+        kept.rows(np.array([3, one.n_vertices + 3]))
