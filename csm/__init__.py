@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from csm._places import lazily
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 if TYPE_CHECKING:
     from csm.data.humans import load_humans
