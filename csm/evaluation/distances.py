@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from csm._types import BoolArray, FloatArray, IntArray
+from csm.errors import MeshError
 from csm.evaluation.geodesic_rows import StoredGeodesics
 from csm.evaluation.metrics import FLIP_MARGIN, flipped
 from csm.mesh.shape import Mesh
@@ -119,13 +120,15 @@ def target_errors(
     Raises
     ------
     MeshError
-        If the target is not a manifold, which exact distances need.
+        If the target is not a manifold, which exact distances need, or its diameter is not finite.
     """
     surface: Geodesics = geodesics(mesh, distance)
     measured = [m.exact for m in matches]
     if memo is not None and len(_unique([m.truth[m.exact] for m in matches])) <= STORED_POINTS:
         surface = StoredGeodesics(surface, mesh, memo)
     lengths = Lengths(surface.diameter(), float(np.sqrt(mesh.area)))
+    if not np.isfinite(lengths.diameter):
+        raise MeshError(f"{mesh.label}: its {distance} diameter is not finite, so errors have no unit; see csm check")
     margin = FLIP_MARGIN * float(getattr(lengths, normaliser))
     exact = _distances(surface, matches, measured)
     if all(where.all() for where in measured):

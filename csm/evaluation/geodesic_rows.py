@@ -6,7 +6,7 @@ import numpy as np
 
 from csm._types import BoolArray, FloatArray, IntArray
 from csm.mesh.shape import Mesh
-from csm.operators.geodesic import Geodesics
+from csm.operators.geodesic import EXACT_VERSION, Geodesics
 from csm.operators.operators import Memo
 
 FAR = 0.2
@@ -42,6 +42,10 @@ class StoredGeodesics:
     def method(self) -> str:
         """Of the distances: "exact", "heat" or "edge"."""
         return self._surface.method
+
+    @property
+    def _key(self) -> dict[str, object]:
+        return {"method": self.method, **({"version": EXACT_VERSION} if self.method == "exact" else {})}
 
     def rows(self, sources: IntArray) -> FloatArray:
         """Return distances from each of S sources to all vertices, shape (S, N)."""
@@ -84,7 +88,7 @@ class StoredGeodesics:
 
     def diameter(self, max_rows: int = 8) -> float:
         """Estimate the largest distance from below; see `csm.operators.geodesic.Geodesics.diameter`."""
-        params = {"method": self.method, "max_rows": max_rows}
+        params = {**self._key, "max_rows": max_rows}
         kept = self._memo.fetch(
             "geodesic-diameter", self._mesh, params, lambda: {"diameter": np.array(self._surface.diameter(max_rows))}
         )
@@ -94,7 +98,7 @@ class StoredGeodesics:
         kept = self._memo.fetch(
             "geodesic-row",
             self._mesh,
-            {"method": self.method, "source": source},
+            {**self._key, "source": source},
             lambda: {"row": self._surface.rows(np.array([source]))[0].astype(np.float32)},
         )
         self._known[source] = kept["row"]

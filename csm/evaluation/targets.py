@@ -23,6 +23,7 @@ from csm.matching.refinement import Refined
 from csm.mesh.correspondence import ground_truth
 from csm.mesh.perturb import Damaged
 from csm.mesh.shape import Mesh
+from csm.operators.geodesic import EXACT_VERSION
 
 Perturbation: TypeAlias = Callable[[Mesh], Damaged]
 """A change of a mesh; of a module, not a lambda, where there are workers."""
@@ -285,6 +286,8 @@ def _key(plan: Plan, cell: Cell, maps: str, changed: Damaged | None) -> dict[str
     asked = {name: value for name, value in asdict(plan.protocol).items() if name not in ("pairs", "sample")}
     if asked["fallback"] is None:
         del asked["fallback"]  # results from before there was one stay valid
+    if asked["distance"] == "exact":
+        asked["version"] = EXACT_VERSION
     return {
         "method": dict(plan.methods[cell.method].key),
         "matcher": {"name": cell.matcher, **plan.matchers[cell.matcher].parameters()},

@@ -24,6 +24,9 @@ from csm.operators._pairs import PairPlan, plan_pairs
 
 Method: TypeAlias = Literal["exact", "heat", "edge"]
 
+EXACT_VERSION = 2
+"""Raised where exact distances change, so that what was kept of them is computed anew."""
+
 
 class Geodesics(Protocol):
     """Distances on one mesh; infinite between vertices that no path joins."""
@@ -182,7 +185,23 @@ class _Exact(_OnMesh):
         # With the limit 0 the front goes on exactly until it has passed the last target.  Asking for a vertex that it
         # never reaches would give an undefined number, which is why targets stay inside one component.
         found: FloatArray = self.algorithm.geodesicDistances(np.array([source]), targets, 0.0)[0]
-        return found
+        return found if np.isfinite(found).all() else self._filled(source)[targets]
+
+    def _filled(self, source: int) -> FloatArray:
+        """Return the row of a used vertex, in which vertices that no window has reached go by their neighbours.
+
+        Beside faces that are a thousandth of others in size, as marching cubes make them, rounding may lose the windows
+        of a single vertex.  What its neighbours are away, and the edge to them, is a little too long.
+        """
+        reached = np.flatnonzero(self.component == self.component[source])
+        row = np.full(len(self.used), np.inf)
+        row[reached] = self.algorithm.geodesicDistances(np.array([source]), reached, 0.0)[0]
+        lost = reached[~np.isfinite(row[reached])]
+        for _ in lost:  # as many rounds as a chain of them may need
+            row[lost] = [(row[near.indices] + near.data).min() for near in (self.graph[[i]] for i in lost)]
+            if np.isfinite(row[lost]).all():
+                break
+        return row
 
 
 class _Heat(_OnMesh):

@@ -181,3 +181,25 @@ def test_pairs_on_a_body_equal_full_rows(data_set: Callable[[str], Path]) -> Non
     here = np.searchsorted(np.unique(sources), sources)
     targets = np.where(rng.random(300) < 0.8, near[here, rng.integers(0, 199, 300)], rng.integers(0, 6890, 300))
     np.testing.assert_allclose(surface.pairs(sources, targets), rows[here, targets], atol=1e-6)
+
+
+def test_a_vertex_that_no_window_has_reached_goes_by_its_neighbours():
+    mesh = blob(2)
+    whole = geodesics(mesh, "exact").rows(np.array([0]))[0]
+    lossy = geodesics(mesh, "exact")
+    near, far = mesh.faces[-1, :2]
+    exact = lossy.algorithm
+
+    class Losing:
+        def geodesicDistances(self, sources, targets, limit):
+            found, *rest = exact.geodesicDistances(sources, targets, limit)
+            return np.where(np.isin(targets, (near, far)), np.inf, found), *rest
+
+    lossy.algorithm = Losing()
+    row = lossy.rows(np.array([0]))[0]
+    assert np.isfinite(lossy.diameter())
+    np.testing.assert_array_equal(np.delete(row, [near, far]), np.delete(whole, [near, far]))
+    longest = np.linalg.norm(mesh.corners - np.roll(mesh.corners, 1, axis=1), axis=2).max()
+    assert (whole[[near, far]] <= row[[near, far]]).all()
+    assert (row[[near, far]] <= whole[[near, far]] + longest).all()
+    assert lossy.pairs(np.array([0]), np.array([near])) == row[near]
