@@ -81,21 +81,23 @@ def is_table(experiment: str) -> bool:
     return file.is_file() and any(line.startswith("rows:") for line in file.read_text(encoding="utf-8").splitlines())
 
 
-def data_of(experiment: str) -> tuple[str | None, list[str]]:
-    """Return the data set that an experiment chooses, and which settings of that set it has; None if it chooses none.
+def own_settings(experiment: str, group: str) -> tuple[str | None, list[str]]:
+    """Return what an experiment chooses of a group, and which settings of that choice it has; None if it chooses none.
 
     Examples
     --------
-    >>> data_of("demo"), data_of("faust"), data_of("of_my_own")
-    (('humans', ['test', 'split']), ('faust', []), (None, []))
+    >>> own_settings("demo", "data"), own_settings("demo", "descriptor")
+    (('humans', ['test', 'split']), ('acd_paper', ['angles']))
+    >>> own_settings("faust", "data"), own_settings("of_my_own", "data")
+    (('faust', []), (None, []))
     """
     from omegaconf import OmegaConf
 
     file = config_folder() / "experiment" / f"{experiment}.yaml"
     content: Any = OmegaConf.to_container(OmegaConf.load(file)) if file.is_file() else {}
     defaults = [item for item in content.get("defaults", ()) if isinstance(item, dict)]
-    chosen = next((item["override /data"] for item in defaults if "override /data" in item), None)
-    return chosen, [key for key in content.get("data", ()) if key not in _OF_ALL_DATA]
+    chosen = next((item[f"override /{group}"] for item in defaults if f"override /{group}" in item), None)
+    return chosen, [key for key in content.get(group, ()) if group != "data" or key not in _OF_ALL_DATA]
 
 
 _OF_ALL_DATA = ("basis_k", "holdout", "also", "test_forms")

@@ -24,7 +24,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
     """Test the checkpoint; descriptor and basis are those it was trained with."""
     from csm.commands.tested import conclude
     from csm.data.inspection import require_sound
-    from csm.experiments.testing import measure_all, numbers, require_same_test, weights_of
+    from csm.experiments.testing import measure_all, numbers, require_same_test
     from csm.matching.methods import require_classifier
     from csm.matching.network import load_model
     from csm.matching.registry import matchers
@@ -39,7 +39,7 @@ def run(cfg: DictConfig) -> dict[str, Any]:
         raise ConfigError("data.test=[]: wanted a set to test on at least")
     require_classifier([method], matchers(matching))
     require_results(cfg.results)
-    require_same_test(output_folder(), data, protocol, matching, weights_of(method))
+    require_same_test(output_folder(), data, protocol, matching, method)
     require_sound(data, exact=protocol.distance == "exact" and not protocol.fallback, train=False)
     print(
         f"{cfg.checkpoint}: testing on {counted(len(data.split.test), 'shape')} of {', '.join(data.test_sets)}",

@@ -181,7 +181,7 @@ def _of_hydra(error: BaseException, config_name: str) -> str:
 def _unknown_key(key: str, config_name: str) -> str:
     if key in MOVED:
         return f"{key} is now {MOVED[key]}"
-    keys = known_keys(config_name)
+    keys = [name for name in known_keys(config_name) if not name.rpartition(".")[2].startswith("_")]
     if key in keys:
         return f"{key} cannot be set or left out in this way; --help and --cfg job show what it may be"
     last = {name.rpartition(".")[2]: name for name in keys}
@@ -189,6 +189,8 @@ def _unknown_key(key: str, config_name: str) -> str:
     if not near and key.rpartition(".")[2] in last:
         near = f"; did you mean {last[key.rpartition('.')[2]]}?"
     near = near or nearest_names(key.rpartition(".")[2], last)
+    if key.startswith("trainer."):
+        near += f"; a setting of Lightning's Trainer that is not listed is added: +{key}=VALUE"
     return f"there is no option {key!r}{near}; --help lists the options, --cfg job the settings of what is chosen"
 
 

@@ -145,8 +145,8 @@ def require_own_places(command: str, overrides: Sequence[str]) -> None:
         given = OverridesParser.create().parse_overrides([text for text in overrides if not text.startswith("-")])
     except HydraException:
         return  # Hydra itself says what is wrong with them
-    swept = {one.get_key_element() for one in given if one.is_sweep_override()}
-    out = next((one for one in reversed(given) if one.get_key_element() == "out"), None)
+    swept = {one.key_or_group for one in given if one.is_sweep_override()}
+    out = next((one for one in reversed(given) if one.key_or_group == "out"), None)
     value = None if out is None or out.is_sweep_override() else str(out.value())
     keys = _NAMED_BY[command] if value in (None, "None") else ("out",)
     if swept and not swept & set(keys) and "${" not in str(value):

@@ -20,4 +20,6 @@ def conclude(cfg: DictConfig, tested: list[Tested], notes: str, more: Sequence[S
     page = write_results(tested, folder, cfg.results, notes, more)
     print(markdown_table([t.row for t in tested]) + LEGEND)
     print(*map(worst_line, tested), sep="\n")
+    for said in dict.fromkeys(t.row.protocol for t in tested):
+        print(f"protocol:     {said.partition('; left-right')[0]}")
     print(f"table:        {folder / 'rows.json'}, rows.csv\nreport:       {page}")

@@ -10,6 +10,7 @@ import difflib
 import os
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import fields
 from pathlib import Path
 
 from csm.errors import ConfigError
@@ -92,7 +93,8 @@ def to_overrides(command: str, arguments: Sequence[str]) -> list[str]:
             words.append(argument)
         else:
             overrides.append(_override(command, argument, sweeping))
-    _require_data_of_experiment(overrides)
+    for group, what in (("data", "set"), ("descriptor", "descriptor")):
+        _require_own_settings(overrides, group, what)
     return [*flags, *_named(command, words), *filter(None, overrides), *options]
 
 
@@ -167,20 +169,31 @@ def _require_experiment_of(command: str, value: str) -> None:
             )
 
 
-def _require_data_of_experiment(overrides: Sequence[str]) -> None:
-    """Refuse other data than those of an experiment where it has settings for its own set that are left as they are."""
-    from csm.commands.choices import data_of
+def _require_own_settings(overrides: Sequence[str], group: str, what: str) -> None:
+    """Refuse another choice than an experiment's where it has settings for its own one that are left as they are."""
+    from csm.commands.choices import own_settings
 
     typed = {key.lstrip("+~"): value for key, _, value in (text.partition("=") for text in overrides)}
-    if not {"experiment", "data"} <= set(typed):
+    if not {"experiment", group} <= set(typed):
         return
-    own, settings = data_of(typed["experiment"])
-    left = [f"data.{key}" for key in settings if f"data.{key}" not in typed]
-    if own not in (None, typed["data"]) and left:
+    own, settings = own_settings(typed["experiment"], group)
+    known = _parameters(typed[group]) if group == "descriptor" else ()
+    left = [f"{group}.{key}" for key in settings if f"{group}.{key}" not in typed and key not in known]
+    if own not in (None, typed[group]) and left:
         raise ConfigError(
-            f"experiment={typed['experiment']} sets {' and '.join(left)} for data={own}, and data={typed['data']} is "
-            f"another set; add {' '.join(f'~{key}' for key in left)}, or give your own"
+            f"experiment={typed['experiment']} sets {' and '.join(left)} for {group}={own}, and {group}={typed[group]} "
+            f"is another {what}; add {' '.join(f'~{key}' for key in left)}, or give your own"
         )
+
+
+def _parameters(descriptor: str) -> tuple[str, ...]:
+    """Return the names of the parameters of a preset; none of what is no preset, such as a list of them for a sweep."""
+    from csm.descriptors.presets import preset
+
+    try:
+        return tuple(field.name for field in fields(preset(descriptor)))
+    except ConfigError:
+        return ()
 
 
 def _assignments(value: str) -> list[str]:

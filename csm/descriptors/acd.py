@@ -23,6 +23,8 @@ from csm.operators.spectrum import Spectrum
 
 _log = logging.getLogger(__name__)
 
+_SMALL = 500  # vertices of a mesh all of whose eigenpairs are taken where it has fewer than are asked for
+
 
 @dataclass(frozen=True)
 class ACD(ByAngle):
@@ -165,6 +167,7 @@ class ACD(ByAngle):
         mesh, several = operators.mesh, operators.n_components > 1
         sizes = np.bincount(component_areas(mesh)[0]) if several else np.array([mesh.n_vertices])
         few = int((sizes < self.k).sum())
+        self.require(self.k <= max(sizes.max(), _SMALL), "k", f"at most {sizes.max()}, the vertices of {mesh.label}")
         if few:
             short = counted(few, "component has", "components have") if several else "the mesh has"
             _log.warning(

@@ -131,7 +131,9 @@ class Descriptor(ABC):
             if kind in ("int", "float") and not isinstance(value, int | float):
                 object.__setattr__(self, field.name, int(value) if kind == "int" else float(value))
         for name, words in _choices(type(self)).items():
-            self.require(getattr(self, name) in words, name, f"one of {', '.join(words)}")
+            value = getattr(self, name)
+            known = any(type(value) is type(word) and value == word for word in words)
+            self.require(known, name, f"one of {', '.join(words)}")
 
     def require(self, good: bool, name: str, wanted: str) -> None:
         """Raise a `csm.errors.ParameterError` about a parameter unless its value is good.

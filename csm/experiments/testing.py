@@ -117,21 +117,22 @@ def _row(evaluation: Evaluation, method: Method, shapes: ShapeSet, table: str, s
         provenance(),
         table=table,
         method=method.name,
-        train=training.get("set", "none"),
+        train=" and ".join([training.get("set", "none"), *training.get("also", ())]),
         test=shapes.name,
         seeds=[training["seed"]] if "seed" in training else [],
         epochs=training.get("epochs"),
     )
-    return replace(row, split=split, weights=weights_of(method))
+    return replace(row, split=split, weights=weights_of(method, row.matching))
 
 
-def weights_of(method: Method) -> str:
-    """Return the hash of a network's weights; empty for a handcrafted descriptor."""
-    return str(getattr(method, "weights", ""))
+def weights_of(method: Method, matching: str) -> str:
+    """Return the hash of the weights that a matcher goes by; empty for a handcrafted descriptor."""
+    whole = str(method.key.get("weights", ""))
+    return whole if matcher(matching.partition("+")[0]).by_classifier else str(getattr(method, "weights", whole))
 
 
 def require_same_test(
-    folder: Path, data: DataModule, protocol: EvaluationProtocol, matching: Sequence[str], weights: str | None = None
+    folder: Path, data: DataModule, protocol: EvaluationProtocol, matching: Sequence[str], method: Method | None = None
 ) -> None:
     """Raise before the work if a test in a folder would replace the rows of another one.
 
@@ -144,8 +145,8 @@ def require_same_test(
         Where ``rows.json`` may be.
     data, protocol, matching
         What is to be tested, and how.
-    weights
-        Of the network, see `weights_of`; None where a training that goes on changes them.
+    method
+        The network; None where a training that goes on changes it.
 
     Raises
     ------
@@ -162,7 +163,7 @@ def require_same_test(
     for row in read_rows(path) if path.exists() else ():
         had = {"matching": row.matching, "test set": row.test, "split": row.split, "protocol": row.protocol}
         other = [what for what in asked if had[what] and had[what] not in asked[what]]
-        if row.weights and weights not in (None, row.weights):
+        if not other and row.weights and method and row.weights != weights_of(method, row.matching):
             other = ["network"]
         if other:
             raise ConfigError(

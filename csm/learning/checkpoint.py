@@ -85,7 +85,7 @@ def load_module(path: str | os.PathLike[str]) -> Describer:
     if not path.is_file():
         raise DataError(
             f"{path}: there is no such checkpoint; csm train writes model.ckpt into its output folder, and csm brings "
-            "the network humans"
+            "the networks humans and humans_parts"
         )
     try:
         found = _load_export(path) if path.suffix == ".json" else _load_checkpoint(path)

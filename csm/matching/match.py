@@ -9,7 +9,9 @@ import numpy as np
 from csm._counts import counted
 from csm._types import Float32Array
 from csm.data.store import Store
+from csm.descriptors.acd import ACD
 from csm.descriptors.base import Descriptor
+from csm.descriptors.stack import Stack
 from csm.matching.base import Described, Matcher, require_device
 from csm.matching.both import BothWays, match_both_ways
 from csm.matching.confidence import share_returning
@@ -112,7 +114,7 @@ def match_of(
     source, target = subjects
     forward, backward = on_given(found.forward, source, target), on_given(found.backward, target, source)
     features = _on_given_rows(described[0], source), _on_given_rows(described[1], target)
-    notes = (*filter(None, [why]), *_notes(source, target, method), *_against_input(*described))
+    notes = (*filter(None, [why]), *_notes(source, target, method, matcher), *_against_input(*described))
     return Match(source.given, target.given, forward, backward, method, matcher, notes, found.text, features)
 
 
@@ -144,14 +146,26 @@ def _on_given_rows(described: Described, subject: Subject) -> Float32Array:
     return np.where(at[:, None] >= 0, rows[at], np.float32(0))
 
 
-def _notes(source: Subject, target: Subject, method: Method) -> tuple[str, ...]:
+def _notes(source: Subject, target: Subject, method: Method, matcher: Matcher) -> tuple[str, ...]:
     said = [f"{subject.given.label}: {note}" for subject in (source, target) for note in subject.notes]
-    if isinstance(method, DescriptorMethod) and method.descriptor.turns:
-        said.append(
-            f"{method.name} compares where vertices are in space: its neighbours return to their place even where they "
-            "are wrong, so its confidence, which goes by that, is too high"
-        )
+    if isinstance(method, DescriptorMethod):
+        said += _of_descriptor(method.name, method.descriptor, refined=isinstance(matcher, Refined))
     return tuple(dict.fromkeys([*said, *_compared(source, target, method.name)]))
+
+
+def _of_descriptor(name: str, descriptor: Descriptor, refined: bool) -> list[str]:
+    """Say it where the confidence of a descriptor is too high: it was fitted on maps by ACD."""
+    if descriptor.turns:
+        return [
+            f"{name} compares where vertices are in space: its neighbours return to their place even where they are "
+            "wrong, so its confidence, which goes by that, is too high"
+        ]
+    if refined or isinstance(descriptor, ACD | Stack):
+        return []
+    return [
+        f"the confidence of neighbours was fitted on maps by acd; {name} exchanges left and right, or limbs, more "
+        "often, and its neighbours return all the same, so its confidence may be far too high"
+    ]
 
 
 def _compared(source: Subject, target: Subject, method: str) -> list[str]:

@@ -53,10 +53,12 @@ def welded(vertices: FloatArray, faces: IntArray, tolerance: float) -> IntArray:
     starts, ends = np.where(turned, heads, tails), np.where(turned, tails, heads)
     keys = edge_keys(place[starts], place[ends], len(vertices))
     order = np.argsort(keys, kind="stable")
-    order = order[(place[starts] != place[ends])[order]]  # an edge within one place has no direction to be joined in
+    within = place[starts] == place[ends]  # an edge within one place vanishes, and faces of nothing else with it
+    order = order[~within[order]]
     same = np.flatnonzero(np.diff(keys[order]) == 0)
     a, b = order[same], order[same + 1]
-    group = components(np.r_[starts[a], ends[a]], np.r_[starts[b], ends[b]], len(vertices))
+    one, other = np.r_[starts[a], ends[a], starts[within]], np.r_[starts[b], ends[b], ends[within]]
+    group = components(one, other, len(vertices))
     return np.unique(group, return_index=True)[1][group]
 
 

@@ -94,6 +94,8 @@ def test_results_are_added_to_results_only(tmp_path):
         ("match", ["source='a.off'", "target='b.off'", "out='r'"], None),
         ("match", ["-m", "source='a.off'", "out='r_${hydra:job.num}'", "refine=none,joint"], None),
         ("clean", ["-m", "in='a.off'", "out='b.off','c.off'", "weld=true,false"], None),
+        ("describe", ["-m", "mesh='a.off'", "descriptor=hks,gps", "++out='d_${hydra:job.num}'"], None),
+        ("match", ["-m", "++source='a.off','c.off'", "target='b.off'"], None),
         ("train", ["-m", "seed=0,1"], None),
         ("match", ["-m", "out='r'", "refine=[none"], None),
     ],

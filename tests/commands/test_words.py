@@ -120,8 +120,12 @@ def test_settings_for_the_data_of_an_experiment_are_named_where_others_are_chose
         ["experiment=demo", "data=humans"],
         ["experiment=faust", "data=scape"],
         ["experiment=tune", *words[1:]],
+        ["experiment=demo", "descriptor=acd"],
+        ["experiment=demo", "descriptor=hks", "~descriptor.angles"],
     ):
         to_overrides("train", fine)
+    with pytest.raises(ConfigError, match=r"sets descriptor\.angles for descriptor=acd_paper, and descriptor=hks"):
+        to_overrides("train", ["experiment=demo", "descriptor=hks"])
 
 
 def test_only_near_names_are_offered():

@@ -214,6 +214,8 @@ def test_a_mesh_with_fewer_vertices_than_eigenpairs_uses_those_that_there_are_an
     ACD()(both)
     assert len(caplog.records) == 1
     assert "x: 1 component has fewer vertices than the 11 eigenpairs" in caplog.text
+    with pytest.raises(ConfigError, match="k=100000; wanted at most 642, the vertices of blob"):
+        ACD(k=100_000)(blob(3))
 
 
 def test_a_whole_damping_is_a_number_as_others_are():

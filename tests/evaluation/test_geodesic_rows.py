@@ -95,3 +95,13 @@ def test_a_pair_on_two_components_is_never_nearer(tmp_path):
         there = np.array([0, one.n_vertices])
         assert kept.nearer(np.array([1, 1]), there, np.array([99.0, 99.0])).tolist() == [True, False]
         kept.rows(np.array([3, one.n_vertices + 3]))
+
+
+def test_heat_distances_which_are_not_symmetric_are_measured(tmp_path):
+    mesh, rng = blob(3), np.random.default_rng(1)
+    asked, surface = rng.integers(0, mesh.n_vertices, (2, 200)), geodesics(mesh, "heat")
+    kept = StoredGeodesics(surface, mesh, Store(tmp_path))
+    kept.rows(np.arange(0, mesh.n_vertices, 20))
+    distances = surface.pairs(*asked)
+    than = distances * rng.choice([0.99, 1.01], 200)
+    np.testing.assert_array_equal(kept.nearer(*asked, than), distances < than)

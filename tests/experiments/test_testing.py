@@ -2,6 +2,8 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -54,7 +56,7 @@ def test_a_set_is_tested_on_the_test_shapes_of_the_split(data, network):
         assert (row.matching, row.seeds, row.epochs, row.pairs) == (alone.matcher, (4,), 7, 6)
         assert row.age == alone.summary["age"]
         assert row.split == data.split.label
-        assert row.weights == network.weights
+        assert row.weights == (network.weights if row.matching == "nearest" else network.key["weights"])
         assert (one.names, one.shapes.name, one.method) == (names, "again", network)
 
 
@@ -96,11 +98,15 @@ def test_what_cannot_be_tested_is_named(data, network, tmp_path):
         measure_set(network, data, data.train_set, PROTOCOL, matching=["nearest", "nearest"])
 
 
+def weighing(weights: str) -> Any:
+    return SimpleNamespace(weights=weights, key={"weights": f"{weights}, and the classifier"})
+
+
 def test_rows_of_another_test_are_not_replaced(data, network, tmp_path):
-    require_same_test(tmp_path, data, PROTOCOL, ["nearest"], "any")
+    require_same_test(tmp_path, data, PROTOCOL, ["nearest"], weighing("any"))
     rows = [replace(t.row, weights="mine") for t in measure_all(network, data, PROTOCOL)]
     write_rows(tmp_path / "rows.json", rows)
-    require_same_test(tmp_path, data, PROTOCOL, ["nearest", "argmax"], "mine")
+    require_same_test(tmp_path, data, PROTOCOL, ["nearest", "argmax"], weighing("mine"))
     require_same_test(tmp_path, data, PROTOCOL, ["nearest"])
 
     fewer = copy(data)
@@ -113,11 +119,11 @@ def test_rows_of_another_test_are_not_replaced(data, network, tmp_path):
         (fewer, PROTOCOL, ["nearest"], "mine", "test set"),
     ):
         with pytest.raises(
-            ConfigError, match=rf"rows\.json: has the errors of net on .* with another {said}, .*choose a new"
+            ConfigError, match=rf"rows\.json: has the errors of net on .* with another {said}, .*into a new folder"
         ):
-            require_same_test(tmp_path, other, protocol, matching, weights)
+            require_same_test(tmp_path, other, protocol, matching, weighing(weights))
     write_rows(tmp_path / "rows.json", [replace(rows[0], split="other (1 train, 2 test, 0)")])
     with pytest.raises(ConfigError, match="with another split"):
         require_same_test(tmp_path, data, PROTOCOL, ["nearest"])
     write_rows(tmp_path / "rows.json", [replace(rows[0], split="", weights="")])
-    require_same_test(tmp_path, data, PROTOCOL, ["nearest"], "mine")
+    require_same_test(tmp_path, data, PROTOCOL, ["nearest"], weighing("mine"))

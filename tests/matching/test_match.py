@@ -42,10 +42,12 @@ def test_files_presets_methods_and_matchers_are_taken(meshes, tmp_path):
     match = csm.match(str(paths[0]), paths[1], DescriptorMethod(CHEAP, "mine"), Nearest(), refine="none", store=store)
     assert (match.method.name, match.matcher, match.target.name) == ("mine", Nearest(), "turned")
     assert (match.indices == np.arange(162)).mean() > 0.99
+    assert "was fitted on maps by acd; mine exchanges" in match.notes[0]
     by_place = csm.match(paths[0], meshes[0], "xyz", refine="none", store=store)
     assert by_place.coverage == 1.0
     assert "so its confidence" in by_place.notes[0]
-    assert not match.notes
+    by_acd = csm.match(*meshes, csm.preset("acd", k=10, cuts=4), refine="none", store=store)
+    assert not by_acd.notes
 
 
 def test_all_kinds_of_meshes_are_taken_and_named(meshes, tmp_path):

@@ -164,3 +164,12 @@ def test_ends_of_edges_of_no_length_are_joined():
     target = joined_short_edges(vertices, faces)
     assert target[36] == 14
     assert (target[:36] == np.arange(36)).all()
+
+
+def test_a_loose_face_all_of_whose_corners_are_in_one_place_is_welded_to_nothing():
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], dtype=float)
+    tiny = corners[1] + 1e-7 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    soup = np.vstack([corners[[0, 1, 2]], corners[[2, 1, 3]], tiny])
+    first = welded(soup, np.arange(9).reshape(3, 3), 1e-5)
+    assert len(set(first[6:])) == 1
+    assert len(set(first[:6])) == 4

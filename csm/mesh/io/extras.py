@@ -67,8 +67,10 @@ def _of_ply(data: bytes) -> Extras:
     columns = read_elements(data, header, ("vertex",))[0]["vertex"]
     if any((columns[name].sizes != 1).any() for name in _RGB):
         return Extras(others=tuple(others))
-    colors = np.stack([columns[name].values for name in _RGB], axis=1).astype(np.uint8)
-    return Extras(colors, tuple(name for name in others if name not in _RGB))
+    values = np.stack([columns[name].values for name in _RGB], axis=1)
+    if not np.isin(values, np.arange(256)).all():  # numbers of a text file may be any
+        return Extras(others=tuple(others))
+    return Extras(values.astype(np.uint8), tuple(name for name in others if name not in _RGB))
 
 
 def _of_obj(data: bytes) -> Extras:
@@ -79,12 +81,19 @@ def _of_obj(data: bytes) -> Extras:
     widths = {len(row) for row in rows if row[0] == "v"}
     colors = None
     if widths == {7}:
-        values = np.array([row[4:] for row in rows if row[0] == "v"], dtype=np.float64)
-        if values.min(initial=0) >= 0 and values.max(initial=0) <= 1:
-            colors = np.rint(255 * values).astype(np.uint8)
+        colors = _of_unit([row[4:] for row in rows if row[0] == "v"])
     if colors is None and widths & {7, 8}:
         others = ["colours", *others]
     return Extras(colors, tuple(others))
+
+
+def _of_unit(words: list[list[str]]) -> NDArray[np.uint8] | None:
+    """Return colours that are written as numbers from 0 to 1; None if they are anything else."""
+    try:
+        values = np.array(words, dtype=np.float64)
+    except ValueError:
+        return None
+    return np.rint(255 * values).astype(np.uint8) if ((values >= 0) & (values <= 1)).all() else None
 
 
 def _of_off(data: bytes) -> Extras:

@@ -33,6 +33,17 @@ def test_colours_of_another_kind_are_named_only(tmp_path):
     assert found.others == ("red", "green", "blue")
 
 
+@pytest.mark.parametrize("odd", [300, -1, 1.5])
+def test_colours_of_a_text_file_that_are_no_bytes_are_not_carried(odd, tmp_path):
+    head = "ply\nformat ascii 1.0\nelement vertex 3\n" + "".join(f"property float {c}\n" for c in "xyz")
+    head += "".join(f"property uchar {c}\n" for c in ("red", "green", "blue"))
+    head += "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    file = tmp_path / "a.ply"
+    file.write_text(head + f"0 0 0 {odd} 1 2\n1 0 0 3 4 5\n0 1 0 6 7 8\n3 0 1 2\n")
+    assert read_extras(file).colors is None
+    assert read_extras(file).others == ("red", "green", "blue")
+
+
 def test_what_an_obj_has_besides(tmp_path):
     file = tmp_path / "a.obj"
     file.write_text("v 0 0 0 1 0 0.2\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\n")
@@ -42,6 +53,8 @@ def test_what_an_obj_has_besides(tmp_path):
     file.write_text("v 0 0 0 200 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nf 1 2 3\n")
     assert read_extras(file).others == ("colours",)
     assert read_extras(file).colors is None
+    file.write_text("v 0 0 0 a b c\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nf 1 2 3\n")
+    assert read_extras(file).others == ("colours",)
     file.write_text("v 0 0 0 1\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     assert read_extras(file).others == ()
 
