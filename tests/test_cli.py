@@ -11,6 +11,7 @@ from hydra.core.global_hydra import GlobalHydra
 from omegaconf import OmegaConf
 
 import csm
+from csm.commands.help import IDLE
 from csm.commands.main import COMMANDS, main
 
 
@@ -64,7 +65,7 @@ def test_cfg_job_prints_the_configuration_and_runs_nothing(run, command, tmp_pat
 def test_help_explains_every_command(run, command, tmp_path):
     text = run(command, "--help")
     assert text.startswith(f"usage: csm {command} ")
-    assert "  workers=null " in text
+    assert ("  workers=null " in text) == ("workers" not in IDLE.get(command, ()))
     assert list(tmp_path.iterdir()) == []
 
 
