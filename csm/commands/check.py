@@ -131,10 +131,12 @@ def check_files(paths: Sequence[Path]) -> dict[str, Any]:
     rows = [_of_file(file) for _, files in groups for file in files]
     without = [Inspected(str(path), problems=(f"{path}: {_NO_MESHES}",)) for path in empty]
     print("\n".join(_table([*rows, *without])))
-    n_bad = sum(bool(row.problems) for row in rows)
-    print(f"\n{counted(len(rows), 'mesh')}, {len(rows) - n_bad} can be matched")
+    n_gone = sum(not os.path.lexists(path) for path in paths)
+    n_meshes, n_bad = len(rows) - n_gone, sum(bool(row.problems) for row in rows) - n_gone
+    print(f"\n{counted(n_meshes, 'mesh')}, {n_meshes - n_bad} can be matched")
     print("".join(f"{line}\n" for path in paths for line in _left_out(path)), end="")
-    said = [f"{n_bad} of {counted(len(rows), 'mesh')} cannot be used"] if n_bad else []
+    said = [f"{n_bad} of {counted(n_meshes, 'mesh')} cannot be used"] if n_bad else []
+    said += [f"{counted(n_gone, 'file or folder is', 'files or folders are')} not there"] if n_gone else []
     said += [f"{counted(len(empty), 'folder has', 'folders have')} no meshes"] if empty else []
     if said:
         raise DataError(f"{' and '.join(said)}, see the table")

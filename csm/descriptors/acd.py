@@ -104,6 +104,8 @@ class ACD(ByAngle):
         super().__post_init__()
         self.require_at_least(0, "alpha", "order", "damping")
         self.require_at_least(1, "angles", "cuts")
+        if self.cuts > type(self).cuts:  # more than usual, so it is what was asked for
+            self.require(self.k > self.cuts, "cuts", f"fewer than k={self.k}, so that the last cut has 2 eigenpairs")
         self.require(self.k > self.cuts, "k", f"more than cuts={self.cuts}, so that the last cut has 2 eigenpairs")
         self._require_different_angles()
 

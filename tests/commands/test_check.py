@@ -92,8 +92,8 @@ def test_every_argument_gets_its_answer(tmp_path, capsys):
     out, error = checked(capsys, tmp_path / "gone.off", tmp_path / "empty", tmp_path / "full")
     assert "gone.off: there is no such file" in out
     assert "empty: there are no meshes in this folder" in out
-    assert "3 meshes, 2 can be matched" in out
-    assert error == "1 of 3 meshes cannot be used and 1 folder has no meshes, see the table"
+    assert "2 meshes, 2 can be matched" in out
+    assert error == "1 file or folder is not there and 1 folder has no meshes, see the table"
     assert "empty: there are no meshes in this folder" in checked(capsys, tmp_path / "empty", use="match")[1]
     out, error = checked(capsys, tmp_path / "empty", tmp_path / "full" / "a.off")
     assert error == "1 folder has no meshes, see the table"

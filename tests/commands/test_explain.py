@@ -108,6 +108,7 @@ def test_a_config_error_is_itself():
     ("overrides", "said"),
     [
         (["descriptor.damping=-1"], "descriptor.damping=-1: wanted 0 or more"),
+        (["descriptor.cuts=200"], "descriptor.cuts=200: wanted fewer than k=11, so that the last cut has 2 eigenpairs"),
         (["descriptor.k=4"], "descriptor.k=4: wanted more than cuts=4, so that the last cut has 2 eigenpairs"),
         (["descriptor=awft", "descriptor.taus=[0]"], "descriptor.taus=[0]: wanted one number or more, all above 0"),
         (["descriptor=acd_two_bands", "descriptor.parts.low.order=-2"], "descriptor.parts.low.order=-2: wanted 0 or"),
