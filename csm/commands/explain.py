@@ -181,9 +181,10 @@ def _of_hydra(error: BaseException, config_name: str) -> str:
 def _unknown_key(key: str, config_name: str) -> str:
     if key in MOVED:
         return f"{key} is now {MOVED[key]}"
-    keys = [name for name in known_keys(config_name) if not name.rpartition(".")[2].startswith("_")]
-    if key in keys:
+    known = known_keys(config_name)
+    if key in known:
         return f"{key} cannot be set or left out in this way; --help and --cfg job show what it may be"
+    keys = [name for name in known if not name.rpartition(".")[2].startswith("_")]  # those are Hydra's own
     last = {name.rpartition(".")[2]: name for name in keys}
     near = nearest_names(key, keys)
     if not near and key.rpartition(".")[2] in last:

@@ -13,10 +13,12 @@ method and target (the ratio estimator of survey sampling, Cochran, "Sampling te
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from csm._types import BoolArray, FloatArray, IntArray
 from csm.errors import MeshError
@@ -157,9 +159,17 @@ def _distances(surface: Geodesics, matches: Sequence[MatchedPoints], where: Sequ
 def _between(
     surface: Geodesics, starts: Sequence[IntArray], stops: Sequence[IntArray], where: Sequence[BoolArray]
 ) -> list[FloatArray]:
+    first, second = np.concatenate(starts), np.concatenate(stops)
+    return _at(where, lambda mask: surface.pairs(first[mask], second[mask]), float)
+
+
+def _at(
+    where: Sequence[BoolArray], ask: Callable[[BoolArray], NDArray[Any]], kind: type[float] | type[bool]
+) -> list[NDArray[Any]]:
+    """Ask about all points at `where` at once; return the answers in the parts of `where`, 0 elsewhere."""
     mask = np.concatenate(where)
-    found = np.zeros(len(mask))
-    found[mask] = surface.pairs(np.concatenate(starts)[mask], np.concatenate(stops)[mask])
+    found = np.zeros(len(mask), dtype=kind)
+    found[mask] = ask(mask)
     return np.split(found, np.cumsum([len(w) for w in where])[:-1])
 
 
@@ -188,8 +198,10 @@ def _flips(
     """Tell the left-right flips among the points measured exactly, where the miss is large enough for a flip."""
     mirrors = [np.full(len(m.truth), -1) if m.mirror is None else m.mirror for m in matches]
     far = [m.exact & (s > margin) & (mirror >= 0) for m, s, mirror in zip(matches, scaled, mirrors, strict=True)]
-    if isinstance(surface, StoredGeodesics):
-        found = _nearer(surface, mirrors, matches, far, [s - margin for s in scaled])
+    if isinstance(surface, StoredGeodesics):  # which measures all points exactly, so that nothing is scaled
+        starts, stops = np.concatenate(mirrors), np.concatenate([m.matched for m in matches])
+        than = np.concatenate([s - margin for s in scaled])
+        found = _at(far, lambda mask: surface.nearer(starts[mask], stops[mask], than[mask]), bool)
     else:
         distances = _between(surface, mirrors, [m.matched for m in matches], far)
         found = [
@@ -197,21 +209,6 @@ def _flips(
             for m, s, where, from_mirror in zip(matches, scaled, far, distances, strict=True)
         ]
     return [None if m.mirror is None else flip[m.exact] for m, flip in zip(matches, found, strict=True)]
-
-
-def _nearer(
-    surface: StoredGeodesics,
-    mirrors: Sequence[IntArray],
-    matches: Sequence[MatchedPoints],
-    where: Sequence[BoolArray],
-    than: Sequence[FloatArray],
-) -> list[BoolArray]:
-    """Tell which matches are nearer to the mirrored truth than some distances, false elsewhere than at `where`."""
-    mask = np.concatenate(where)
-    starts, stops = np.concatenate(mirrors), np.concatenate([m.matched for m in matches])
-    found = np.zeros(len(mask), dtype=bool)
-    found[mask] = surface.nearer(starts[mask], stops[mask], np.concatenate(than)[mask])
-    return np.split(found, np.cumsum([len(w) for w in where])[:-1])
 
 
 def _joined(
